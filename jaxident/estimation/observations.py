@@ -1,0 +1,57 @@
+"""What the paper's estimators see of a log: path lengths and turns between measured poses, beside the commands."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxident.array_types import Increment, Pose, Wheels
+from jaxident.log import Log
+from jaxident.robot.path_length import increment_between
+
+
+class Observations(NamedTuple):
+    """One entry per sample, that is per row of the log but the very first; all arrays (samples,).
+
+    command is u_{k-1}, held during the sample; command_before u_{k-2}, not to be used where `first`. increment is
+    the path length and turn since the last measured pose of the run (the sample's own where no pose is missing), 0
+    where there is none. seen: a pose ends the sample. measured: a pose ends it and the run has an earlier one.
+    first: the first sample of a run, whose command before is unknown. inside: the sample lies within a run, not
+    across the seam of two.
+    """
+
+    command: Wheels
+    command_before: Wheels
+    increment: Increment
+    seen: Any
+    measured: Any
+    first: Any
+    inside: Any
+
+
+def observe_log(log: Log) -> Observations:
+    """Observations of a log with any number of runs, poses missing (NaN) or not; arrays (rows,) -> (rows - 1,).
+
+    Where poses are missing the increment spans the gap: its Bezier curve joins the poses at both ends, and its turn
+    is taken below half a revolution.
+    """
+    log = Log(*(jnp.asarray(column) for column in log))
+    same_run = log.run[1:] == log.run[:-1]
+    rows = jnp.arange(len(log.t))
+    seen = jnp.isfinite(log.x) & jnp.isfinite(log.y) & jnp.isfinite(log.theta)
+    run_start = jax.lax.cummax(jnp.where(jnp.concatenate([jnp.ones(1, bool), ~same_run]), rows, 0))
+    last_seen = jax.lax.cummax(jnp.where(seen, rows, -1))[:-1]
+    measured = seen[1:] & (last_seen >= run_start[1:])
+    safe = Pose(*(jnp.where(seen, column, 0.0) for column in log.pose))
+    before = Pose(*(column[jnp.maximum(last_seen, 0)] for column in safe))
+    increment = increment_between(before, Pose(*(column[1:] for column in safe)))
+    command = Wheels(log.u_r[:-1], log.u_l[:-1])
+    return Observations(
+        command=command,
+        command_before=Wheels(*(jnp.concatenate([u[:1], u[:-1]]) for u in command)),
+        increment=Increment(*(jnp.where(measured, value, 0.0) for value in increment)),
+        seen=seen[1:],
+        measured=measured,
+        first=rows[1:] == run_start[1:] + 1,
+        inside=same_run,
+    )

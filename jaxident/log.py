@@ -1,0 +1,90 @@
+"""A log: the columns of a file, and what can be said of its time base.
+
+Row k holds the time t_k, the command applied from t_k until t_{k+1} and the camera pose at t_k.
+"""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jaxident.array_types import Pose, Wheels
+from jaxident.errors import InputError
+
+EVEN_TOLERANCE = 0.05
+"""Largest departure of a time stamp from the even grid, in periods: rounding to a millisecond passes, jitter not."""
+
+
+class Log(NamedTuple):
+    """Motor commands and camera poses, one entry per row, all arrays (samples,).
+
+    t [s] rises strictly within a run; u_r, u_l in the user's unit; x, y [m], theta [rad], NaN where the camera saw
+    nothing; run numbers the runs. A named tuple of arrays: it passes through `jit` and `vmap` as it is.
+    """
+
+    t: Any
+    u_r: Any
+    u_l: Any
+    x: Any
+    y: Any
+    theta: Any
+    run: Any
+
+    @property
+    def pose(self) -> Pose:
+        """The pose columns."""
+        return Pose(self.x, self.y, self.theta)
+
+    @property
+    def command(self) -> Wheels:
+        """The command columns."""
+        return Wheels(self.u_r, self.u_l)
+
+    def runs(self) -> list["Log"]:
+        """The log cut into its runs, in the order in which they first appear."""
+        run = np.asarray(self.run)
+        cuts = np.flatnonzero(run[1:] != run[:-1]) + 1
+        edges = [0, *cuts.tolist(), len(run)]
+        return [Log(*(column[a:b] for column in self)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+
+    def rows(self, first: int, last: int) -> "Log":
+        """Rows first to last, the last not included."""
+        return Log(*(column[first:last] for column in self))
+
+
+def make_log(t, u_r, u_l, x=None, y=None, theta=None, run=None) -> Log:
+    """A log from arrays (samples,); columns left out are a camera that saw nothing, and a single run."""
+    blind = np.full(np.shape(t), np.nan)
+    pose = (blind if column is None else column for column in (x, y, theta))
+    return Log(t, u_r, u_l, *pose, np.zeros(np.shape(t), int) if run is None else run)
+
+
+def join(logs: "Log | Sequence[Log]") -> Log:
+    """Several logs as one, their runs renumbered 0, 1, ... in the order given."""
+    logs = [logs] if isinstance(logs, Log) else list(logs)
+    runs = [run for log in logs for run in log.runs()]
+    numbered = [run._replace(run=np.full(len(run.t), number)) for number, run in enumerate(runs)]
+    return Log(*(np.concatenate(columns) for columns in zip(*numbered, strict=True)))
+
+
+def first_rows(log: Log) -> np.ndarray:
+    """Boolean (samples,): the first row of each run."""
+    run = np.asarray(log.run)
+    return np.concatenate([[True], run[1:] != run[:-1]])
+
+
+def even_period(log: Log) -> float:
+    """The sample period [s] that all runs of the log share; InputError naming the first row that breaks it."""
+    runs = [run for run in log.runs() if len(run.t) > 1]
+    if not runs:
+        raise InputError("every run has a single row: no sample period")
+    steps = np.concatenate([np.diff(run.t) for run in runs])
+    starts = np.concatenate([run.t[:-1] for run in runs])
+    median = float(np.median(steps))
+    odd = np.flatnonzero(np.abs(steps - median) > EVEN_TOLERANCE * median)
+    if odd.size:
+        raise InputError(
+            f"uneven time steps: the step from t = {starts[odd[0]]:.6g} s takes {steps[odd[0]]:.4g} s, the median is "
+            f"{median:.4g} s; this method needs an even log, `jaxident convert --period` makes one"
+        )
+    return float(np.mean(steps))

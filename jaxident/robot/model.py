@@ -1,0 +1,90 @@
+"""The model of one robot: what a model file holds."""
+
+import dataclasses
+from typing import Any, NamedTuple
+
+import jax
+
+from jaxident.robot.difference import Difference, to_difference
+from jaxident.robot.drive import Physical
+from jaxident.robot.noise import Noise
+
+
+class Provenance(NamedTuple):
+    """Where a model comes from."""
+
+    version: str = ""
+    method: str = ""
+    logs: tuple[str, ...] = ()
+    seed: int | None = None
+
+
+
+
+class Spread(NamedTuple):
+    """Standard deviation of each parameter, in the shape of the parameter; None where it was not estimated."""
+
+    alpha: Any = None
+    delta: Any = None
+    epsilon: Any = None
+    dead_zone: Any = None
+    physical: Physical | None = None
+    noise: Noise | None = None
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class Effect:
+    """An unmodelled effect in force: its catalogue name, its parameters and their standard deviations or None."""
+
+    name: str = dataclasses.field(metadata={"static": True})
+    parameters: dict[str, Any]
+    standard_deviation: dict[str, Any] | None = None
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
+class Model:
+    """A robot: dead zones, then a linear drive in one of two forms.
+
+    `dynamics` is `Physical`, true at any sample period, or `Difference`, the paper's free numerators, true at
+    `sample_period` [s] only. alpha (2,), delta and epsilon (2, 2) are read from either. A pytree: numbers are
+    leaves, names are structure.
+    """
+
+    sample_period: Any
+    dynamics: Physical | Difference
+    dead_zone: Any
+    noise: Noise | None = None
+    effects: tuple[Effect, ...] = ()
+    standard_deviation: Spread | None = None
+    covariance: Any = None
+    parameter_order: tuple[str, ...] = dataclasses.field(default=(), metadata={"static": True})
+    provenance: Provenance = dataclasses.field(default=Provenance(), metadata={"static": True})
+
+    @property
+    def physical(self) -> Physical | None:
+        """The continuous-time parameters, or None for a model of free numerators."""
+        return self.dynamics if isinstance(self.dynamics, Physical) else None
+
+    @property
+    def difference(self) -> Difference:
+        """Parameters of (13)-(14) at the sample period: as identified, or the hold image of the physical ones."""
+        if isinstance(self.dynamics, Difference):
+            return self.dynamics
+        return to_difference(self.dynamics, self.sample_period)
+
+    @property
+    def alpha(self):
+        """Poles [a1, a2] at the sample period."""
+        return self.difference.alpha
+
+    @property
+    def delta(self):
+        """First numerator coefficients (2, 2) at the sample period [m, rad per unit of command]."""
+        return self.difference.delta
+
+    @property
+    def epsilon(self):
+        """Second numerator coefficients (2, 2), with the sign of (13)-(14) [m, rad per unit of command]."""
+        return self.difference.epsilon

@@ -1,0 +1,77 @@
+"""From poses to signed path lengths and back, PAPER section III.
+
+Between two poses the robot is taken to run along the cubic Bezier curve whose control points lie at a third of the
+chord along the two headings, reversed when it backs.
+"""
+
+import jax.numpy as jnp
+
+from jaxident.array_types import Array, Increment, Pose
+from jaxident.numerics import GAUSS_NODES, GAUSS_WEIGHTS, safe_norm, sin_cos, wrap
+
+
+def path_length(poses: Pose) -> Increment:
+    """Signed path lengths [m] and turns [rad] between consecutive poses (samples,): arrays (samples - 1,).
+
+    Direction by PAPER (9), length by a four-node Gauss-Legendre rule; within 5e-7 m of the true path up to half a
+    radian of turn per sample. A missing pose (NaN) makes both increments beside it NaN.
+    """
+    heading = sin_cos(poses.theta)
+    start, end = Pose(*(c[:-1] for c in poses)), Pose(*(c[1:] for c in poses))
+    length = _signed_length(start, end, tuple(c[:-1] for c in heading), tuple(c[1:] for c in heading))
+    return Increment(length, wrap(end.theta - start.theta))
+
+
+def increment_between(start: Pose, end: Pose) -> Increment:
+    """Signed path length [m] and turn [rad] from one pose to another; any shape, both alike."""
+    length = _signed_length(start, end, sin_cos(start.theta), sin_cos(end.theta))
+    return Increment(length, wrap(end.theta - start.theta))
+
+
+def follow(start: Pose, increments: Increment) -> Pose:
+    """The poses (samples + 1,) that increments (samples,) lead through: the exact inverse of `path_length`.
+
+    Each chord is the path length over that of a Bezier curve with unit chord, at the mean of the two headings.
+    """
+    theta = start.theta + jnp.concatenate([jnp.zeros(1), jnp.cumsum(increments.turn)])
+    sine, cosine = sin_cos(theta[:-1] + 0.5 * increments.turn)
+    chord = increments.length / bezier_over_chord(increments.turn)
+    x = start.x + jnp.concatenate([jnp.zeros(1), jnp.cumsum(chord * cosine)])
+    y = start.y + jnp.concatenate([jnp.zeros(1), jnp.cumsum(chord * sine)])
+    return Pose(x, y, theta)
+
+
+def bezier_over_chord(turn: Array) -> Array:
+    """Length of the Bezier curve over its chord when the headings lie at -turn / 2 and turn / 2 from the chord."""
+    sine, cosine = sin_cos(0.5 * turn)
+    handles = (cosine / 3.0, -sine / 3.0), (cosine / 3.0, sine / 3.0)
+    return _curve_length((jnp.ones_like(turn), jnp.zeros_like(turn)), *handles)
+
+
+def _signed_length(start: Pose, end: Pose, heading_0, heading_1) -> Array:
+    """Headings come as (sine, cosine). At zero chord the value is 0 and the gradient that of moving straight on."""
+    (sine_0, cosine_0), (sine_1, cosine_1) = heading_0, heading_1
+    dx, dy = end.x - start.x, end.y - start.y
+    apart = (dx != 0.0) | (dy != 0.0)
+    dx_safe, dy_safe = jnp.where(apart, dx, 1.0), jnp.where(apart, dy, 0.0)
+    direction = jnp.where(dx_safe * cosine_0 + dy_safe * sine_0 >= 0.0, 1.0, -1.0)  # PAPER (9)
+    third = direction * jnp.sqrt(dx_safe * dx_safe + dy_safe * dy_safe) / 3.0
+    handles = (third * cosine_0, third * sine_0), (third * cosine_1, third * sine_1)
+    moved = direction * _curve_length((dx_safe, dy_safe), *handles)
+    middle_x, middle_y = cosine_0 + cosine_1, sine_0 + sine_1
+    turned = (dx * middle_x + dy * middle_y) / jnp.maximum(safe_norm(middle_x, middle_y), 1e-6)
+    return jnp.where(apart, moved, turned)
+
+
+def _curve_length(chord, first_handle, last_handle) -> Array:
+    """Gauss-Legendre length of a cubic Bezier curve from its chord and its first and last control vectors."""
+    middle = tuple(c - a - b for c, a, b in zip(chord, first_handle, last_handle, strict=True))
+    length = 0.0
+    for p, weight in zip(GAUSS_NODES, GAUSS_WEIGHTS, strict=True):
+        q = 1.0 - p
+        speed_x, speed_y = (
+            3.0 * (q * q * a + 2.0 * p * q * m + p * p * b)
+            for a, m, b in zip(first_handle, middle, last_handle, strict=True)
+        )
+        length = length + weight * safe_norm(speed_x, speed_y)
+    return length

@@ -1,0 +1,93 @@
+"""The nominal simulator: commands in, true states and camera poses out."""
+
+
+import jax
+import jax.numpy as jnp
+
+from jaxident.array_types import AT_REST, Array, Increment, Pose, State, Wheels
+from jaxident.errors import InputError
+from jaxident.log import EVEN_TOLERANCE, Log, even_period
+from jaxident.robot.dead_zone import effective_command
+from jaxident.robot.difference import Difference, predict_increment
+from jaxident.robot.drive import Force, Physical, advance, force, hold
+from jaxident.robot.model import Model
+from jaxident.robot.noise import UnitNoise, draw_noise, observe, slip
+from jaxident.robot.path_length import follow
+
+
+def simulate(model: Model, log: Log, *, start: State = AT_REST, key: Array | None = None) -> Log:
+    """The log that `model` would have produced under the commands and times of `log` (one run, all arrays (samples,)).
+
+    Noise-free without a key; with one, slip and camera noise are drawn by the model's noise law. Steps may differ
+    for a physical model; a model of free numerators refuses a log of another or an uneven period (InputError).
+    Differentiable in the model and the start. Needs double precision only for long runs.
+    """
+    if model.effects:
+        raise InputError(f"effect {model.effects[0].name!r}: this simulator runs nominal models only")
+    unit = None if key is None or model.noise is None else draw_noise(key, len(log.t))
+    if isinstance(model.dynamics, Physical):
+        step = jnp.diff(jnp.asarray(log.t))
+        pose = run_physical(model, log.command, step, start, unit).pose
+    else:
+        check_period(model, log)
+        step = model.sample_period
+        pose = run_difference(model.dynamics, model.dead_zone, log.command, start, model.sample_period)
+    if unit is not None:
+        pose = observe(pose, model.noise, unit, step)
+    return log._replace(x=pose.x, y=pose.y, theta=pose.theta)
+
+
+def run_physical(model: Model, command: Wheels, step: Array, start: State, unit: UnitNoise | None = None) -> State:
+    """States (samples,) at the rows of a run; step [s] is a scalar, or (samples - 1,) from each row to the next."""
+    held = Wheels(*(jnp.asarray(u)[:-1] for u in command))
+    pull = force(model.dynamics, effective_command(held, model.dead_zone))
+    if unit is not None:
+        noise = slip(model.noise, UnitNoise(*(draw[:-1] for draw in unit)), step)
+        pull = Force(pull.along + noise.along, pull.heading + noise.heading)
+    return run_forces(model.dynamics, pull, step, start)
+
+
+def run_forces(physical: Physical, pull: Force, step: Array, start: State) -> State:
+    """States (samples + 1,) under given forces (samples,); step [s] scalar or (samples,)."""
+    even = jnp.ndim(step) == 0
+    solution = hold(physical, jnp.asarray(step))
+
+    def body(state, now):
+        pull, own = now
+        return advance(state, pull, solution if even else own), state
+
+    start = State(*(jnp.asarray(s, dtype=jnp.result_type(float)) + 0.0 * pull.along[0] for s in start))
+    last, states = jax.lax.scan(body, start, (pull, None if even else solution))
+    return State(*(jnp.append(column, end) for column, end in zip(states, last, strict=True)))
+
+
+def run_difference(difference: Difference, dead_zone: Array, command: Wheels, start: State, period: Array) -> Pose:
+    """Poses (samples,) by PAPER (13)-(14); before the first row nothing was commanded and the speed was `start`'s."""
+    first = Increment(jnp.asarray(start.v) * period, jnp.asarray(start.w) * period)
+    return follow(start.pose, free_run(difference, dead_zone, command, first))
+
+
+def free_run(difference: Difference, dead_zone: Array, command: Wheels, before: Increment) -> Increment:
+    """Increments (samples - 1,) between the rows, each from the model's own last one; `before` is the one that ended
+    at the first row, when nothing was commanded yet."""
+    passed = effective_command(Wheels(*(jnp.asarray(u)[:-1] for u in command)), dead_zone)
+    passed_before = Wheels(*(jnp.concatenate([jnp.zeros(1), m[:-1]]) for m in passed))
+
+    def body(last, now):
+        new = predict_increment(difference, last, *now)
+        return new, new
+
+    before = Increment(*(b + 0.0 * passed.right[0] for b in before))
+    return jax.lax.scan(body, before, (passed, passed_before))[1]
+
+
+def check_period(model: Model, log: Log) -> None:
+    """InputError unless the log is even at the model's own period; needs concrete times, so traced ones pass."""
+    if isinstance(log.t, jax.core.Tracer) or isinstance(model.sample_period, jax.core.Tracer):
+        return
+    period = even_period(log)
+    if abs(period - float(model.sample_period)) > EVEN_TOLERANCE * float(model.sample_period):
+        raise InputError(
+            f"sample_period: the model has free numerators and lives at {float(model.sample_period):.6g} s, "
+            f"the log has {period:.6g} s; identify a physical model, or convert the log to the model's period"
+        )
