@@ -1,1 +1,54 @@
-"""jaxident."""
+"""jaxident: identification of differential-drive robots from motor commands and camera poses.
+
+    import jax; jax.config.update("jax_enable_x64", True)
+    import jaxident as ji
+    found = ji.identify(ji.read_log("log.csv"))
+
+Names are looked up on first use, so that importing the package stays light.
+"""
+
+import importlib
+from typing import Any
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "Log": "jaxident.log",
+    "make_log": "jaxident.log",
+    "Wheels": "jaxident.array_types",
+    "Pose": "jaxident.array_types",
+    "State": "jaxident.array_types",
+    "Increment": "jaxident.array_types",
+    "InputError": "jaxident.errors",
+    "WorkError": "jaxident.errors",
+    "Model": "jaxident.robot.model",
+    "Physical": "jaxident.robot.drive",
+    "Difference": "jaxident.robot.difference",
+    "Noise": "jaxident.robot.noise",
+    "to_difference": "jaxident.robot.difference",
+    "to_physical": "jaxident.robot.difference",
+    "simulate": "jaxident.robot.simulate",
+    "path_length": "jaxident.robot.path_length",
+    "EXCITATIONS": "jaxident.robot.excitation",
+    "identify": "jaxident.estimation.identify",
+    "predict": "jaxident.estimation.predict",
+    "read_log": "jaxident.files.logs",
+    "write_log": "jaxident.files.logs",
+    "load_model": "jaxident.files.models",
+    "save_model": "jaxident.files.models",
+}
+_ROOMS = {"recursive": "jaxident.estimation.recursive", "plot": "jaxident.plot"}
+
+__all__ = ["__version__", *_HOMES, *_ROOMS]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        return getattr(importlib.import_module(_HOMES[name]), name)
+    if name in _ROOMS:
+        return importlib.import_module(_ROOMS[name])
+    raise AttributeError(f"module 'jaxident' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

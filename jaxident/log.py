@@ -4,6 +4,7 @@ Row k holds the time t_k, the command applied from t_k until t_{k+1} and the cam
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +13,8 @@ from jaxident.array_types import Pose, Wheels
 from jaxident.errors import InputError
 
 EVEN_TOLERANCE = 0.05
-"""Largest departure of a time stamp from the even grid, in periods: rounding to a millisecond passes, jitter not."""
+"""Largest departure of a time step from the period, in periods: stamps rounded to a millisecond pass up to 60 Hz,
+jitter and gaps do not."""
 
 
 class Log(NamedTuple):
@@ -44,8 +46,7 @@ class Log(NamedTuple):
         """The log cut into its runs, in the order in which they first appear."""
         run = np.asarray(self.run)
         cuts = np.flatnonzero(run[1:] != run[:-1]) + 1
-        edges = [0, *cuts.tolist(), len(run)]
-        return [Log(*(column[a:b] for column in self)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        return [self.rows(a, b) for a, b in pairwise([0, *cuts.tolist(), len(run)])]
 
     def rows(self, first: int, last: int) -> "Log":
         """Rows first to last, the last not included."""
@@ -55,8 +56,8 @@ class Log(NamedTuple):
 def make_log(t, u_r, u_l, x=None, y=None, theta=None, run=None) -> Log:
     """A log from arrays (samples,); columns left out are a camera that saw nothing, and a single run."""
     blind = np.full(np.shape(t), np.nan)
-    pose = (blind if column is None else column for column in (x, y, theta))
-    return Log(t, u_r, u_l, *pose, np.zeros(np.shape(t), int) if run is None else run)
+    x, y, theta = (blind if column is None else column for column in (x, y, theta))
+    return Log(t, u_r, u_l, x, y, theta, np.zeros(np.shape(t), int) if run is None else run)
 
 
 def join(logs: "Log | Sequence[Log]") -> Log:
@@ -65,6 +66,15 @@ def join(logs: "Log | Sequence[Log]") -> Log:
     runs = [run for log in logs for run in log.runs()]
     numbered = [run._replace(run=np.full(len(run.t), number)) for number, run in enumerate(runs)]
     return Log(*(np.concatenate(columns) for columns in zip(*numbered, strict=True)))
+
+
+def between(log: Log, first: float | None, last: float | None) -> Log:
+    """The rows with first <= t <= last [s]; None leaves a side open. InputError where none is left."""
+    t = np.asarray(log.t)
+    kept = (t >= (-np.inf if first is None else first)) & (t <= (np.inf if last is None else last))
+    if not np.any(kept):
+        raise InputError(f"no row between t = {first} and {last} s: the log runs from {t.min():g} to {t.max():g} s")
+    return Log(*(np.asarray(column)[kept] for column in log))
 
 
 def first_rows(log: Log) -> np.ndarray:
@@ -80,11 +90,12 @@ def even_period(log: Log) -> float:
         raise InputError("every run has a single row: no sample period")
     steps = np.concatenate([np.diff(run.t) for run in runs])
     starts = np.concatenate([run.t[:-1] for run in runs])
-    median = float(np.median(steps))
-    odd = np.flatnonzero(np.abs(steps - median) > EVEN_TOLERANCE * median)
+    median = np.quantile(steps, 0.5, method="lower")
+    period = np.mean(steps[np.abs(steps - median) < 0.5 * median])  # without the gaps; stamps may be rounded
+    odd = np.flatnonzero(np.abs(steps - period) > EVEN_TOLERANCE * period)
     if odd.size:
         raise InputError(
-            f"uneven time steps: the step from t = {starts[odd[0]]:.6g} s takes {steps[odd[0]]:.4g} s, the median is "
-            f"{median:.4g} s; this method needs an even log, `jaxident convert --period` makes one"
+            f"uneven time steps: the step from t = {starts[odd[0]]:.6g} s takes {steps[odd[0]]:.4g} s, the others "
+            f"{period:.4g} s; this method needs an even log, `jaxident convert --period` makes one"
         )
-    return float(np.mean(steps))
+    return float(period)

@@ -13,7 +13,7 @@ from jaxident.robot.path_length import increment_between
 class Observations(NamedTuple):
     """One entry per sample, that is per row of the log but the very first; all arrays (samples,).
 
-    command is u_{k-1}, held during the sample; command_before u_{k-2}, not to be used where `first`. increment is
+    command is u_{k-1}, held during the sample; command_before u_{k-2}; 0 where the run has none. increment is
     the path length and turn since the last measured pose of the run (the sample's own where no pose is missing), 0
     where there is none. seen: a pose ends the sample. measured: a pose ends it and the run has an earlier one.
     first: the first sample of a run, whose command before is unknown. inside: the sample lies within a run, not
@@ -45,10 +45,10 @@ def observe_log(log: Log) -> Observations:
     safe = Pose(*(jnp.where(seen, column, 0.0) for column in log.pose))
     before = Pose(*(column[jnp.maximum(last_seen, 0)] for column in safe))
     increment = increment_between(before, Pose(*(column[1:] for column in safe)))
-    command = Wheels(log.u_r[:-1], log.u_l[:-1])
+    command = Wheels(*(jnp.where(same_run, u[:-1], 0.0) for u in log.command))
     return Observations(
         command=command,
-        command_before=Wheels(*(jnp.concatenate([u[:1], u[:-1]]) for u in command)),
+        command_before=Wheels(*(jnp.concatenate([jnp.zeros_like(u[:1]), u[:-1]]) for u in command)),
         increment=Increment(*(jnp.where(measured, value, 0.0) for value in increment)),
         seen=seen[1:],
         measured=measured,

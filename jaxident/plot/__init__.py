@@ -1,0 +1,34 @@
+"""Pictures of logs, predictions and estimates. They compute nothing: arrays in, the axes drawn on out.
+
+Every picture takes `ax`, or makes one with pyplot where it is left out. `figure` makes axes for a file, off screen;
+`save` writes them. Names are looked up on first use, so that matplotlib is loaded only when something is drawn.
+"""
+
+import importlib
+from typing import Any
+
+_HOMES = {
+    "dead_zone": "signals",
+    "commands": "signals",
+    "increments": "signals",
+    "path": "motion",
+    "prediction_error": "motion",
+    "convergence": "estimates",
+    "tracking": "estimates",
+    "error_against_noise": "estimates",
+    "figure": "style",
+    "image": "output",
+    "save": "output",
+}
+
+__all__ = list(_HOMES)
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOMES:
+        return getattr(importlib.import_module(f"jaxident.plot.{_HOMES[name]}"), name)
+    raise AttributeError(f"module 'jaxident.plot' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

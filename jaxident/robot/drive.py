@@ -3,14 +3,20 @@
     [v, w]' = -rate * [v, w] + coupling * [w, v] + gain [m_r, m_l]        l' = v        theta' = w
 """
 
+import math
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-from jax.scipy.linalg import expm
 
 from jaxident.array_types import Array, State, Wheels
 from jaxident.numerics import GAUSS_NODES, GAUSS_WEIGHTS, hold_integrals, sin_cos
+
+DOUBLINGS = 12
+TERMS = 10
+
+Matrix = tuple[tuple[Any, Any], tuple[Any, Any]]
+"""A 2 x 2 matrix by its entries, each of any shape."""
 
 
 class Physical(NamedTuple):
@@ -64,9 +70,14 @@ def force(physical: Physical, passed: Wheels) -> Force:
 def hold(physical: Physical, step: Array) -> Hold:
     """The exact solution over a step [s]; a step of shape (samples,) gives weights (samples,), one set per row."""
     responses = _diagonal_responses if physical.coupling is None else _coupled_responses
-    v, w, turn = responses(physical, step)
-    nodes = [responses(physical, node * step) for node in GAUSS_NODES]
+    parts = jnp.asarray((*GAUSS_NODES, 1.0)).reshape(-1, *[1] * jnp.ndim(step))
+    *nodes, (v, w, turn) = _split(responses(physical, parts * step), len(parts))
     return Hold(step, v, w, turn, tuple(n[0] for n in nodes), tuple(n[2] for n in nodes))
+
+
+def _split(stacked, count: int) -> list:
+    """A tree of arrays with a leading axis of `count`, as that many trees."""
+    return [jax.tree.map(lambda leaf, k=k: leaf[k], stacked) for k in range(count)]
 
 
 def advance(state: State, pull: Force, solution: Hold) -> State:
@@ -76,7 +87,8 @@ def advance(state: State, pull: Force, solution: Hold) -> State:
     below 1e-9 m for a turn of up to one radian within the step.
     """
     start = (state.v, state.w, pull.along, pull.heading)
-    along_x, along_y = 0.0, 0.0
+    along_x: Any = 0.0
+    along_y: Any = 0.0
     for weight, node_v, node_turn in zip(GAUSS_WEIGHTS, solution.node_v, solution.node_turn, strict=True):
         sine, cosine = sin_cos(state.theta + _weigh(node_turn, start))
         v = _weigh(node_v, start)
@@ -106,22 +118,52 @@ def _diagonal_responses(physical: Physical, time: Array) -> tuple[Response, Resp
 
 
 def _coupled_responses(physical: Physical, time: Array) -> tuple[Response, Response, Response]:
-    """v, w and turn after `time` with coupling: blocks of one matrix exponential (Van Loan 1978)."""
+    """v, w and turn after `time` with coupling: exp(A t), its integral P and its double integral Q over [0, t].
+
+    Taylor series at t / 2^12, then doubling: exp(2s) = E E, P(2s) = P + E P, Q(2s) = Q + s P + E Q (scaling and
+    squaring, Higham 2008, chapter 10). Plain arithmetic on 2 x 2 entries maps over any shape; batched calls of the
+    library's matrix exponential do not, and stall on the CPU.
+    """
     rate, coupling = physical.rate, physical.coupling
-    system = jnp.array([[-rate[0], coupling[0]], [coupling[1], -rate[1]]])
-    unit, zero = jnp.eye(2), jnp.zeros((2, 2))
-    augmented = jnp.block([[system, unit, zero], [zero, zero, unit], [zero, zero, zero]])
-    blocks = jnp.vectorize(lambda t: expm(augmented * t), signature="()->(n,n)")(time)
-    decay, once, twice = (jnp.moveaxis(blocks[..., :2, 2 * k : 2 * k + 2], (-2, -1), (0, 1)) for k in range(3))
+    s = time / 2.0**DOUBLINGS
+    decay, once, twice = _exponential_series(((-rate[0] * s, coupling[0] * s), (coupling[1] * s, -rate[1] * s)))
+    once, twice = _scale(s, once), _scale(s * s, twice)
+
+    def double(_, now):
+        decay, once, twice, s = now
+        twice = _add(_add(twice, _scale(s, once)), _multiply(decay, twice))
+        return _multiply(decay, decay), _add(once, _multiply(decay, once)), twice, 2.0 * s
+
+    decay, once, twice, _ = jax.lax.fori_loop(0, DOUBLINGS, double, (decay, once, twice, s))
     return (
-        Response(decay[0, 0], decay[0, 1], once[0, 0], once[0, 1]),
-        Response(decay[1, 0], decay[1, 1], once[1, 0], once[1, 1]),
-        Response(once[1, 0], once[1, 1], twice[1, 0], twice[1, 1]),
+        Response(*decay[0], *once[0]),
+        Response(*decay[1], *once[1]),
+        Response(*once[1], *twice[1]),
     )
 
 
-def steady_speed(physical: Physical, pull: Force) -> jax.Array:
-    """Speeds [v, w] at which the drive settles under a constant force."""
-    coupling = jnp.zeros(2) if physical.coupling is None else physical.coupling
-    system = jnp.array([[physical.rate[0], -coupling[0]], [-coupling[1], physical.rate[1]]])
-    return jnp.linalg.solve(system, jnp.array([pull.along, pull.heading]))
+def _exponential_series(matrix: Matrix) -> list[Matrix]:
+    """sum over k of matrix^k / (k + j)! for j = 0, 1, 2, by Horner's rule."""
+    weights = jnp.array([[1.0 / math.factorial(k + j) for j in range(3)] for k in range(TERMS)])
+    weights = weights.reshape(TERMS, 3, *[1] * jnp.ndim(matrix[0][0]))
+    zero = jnp.zeros((3, *jnp.shape(matrix[0][0])))
+
+    def add_term(k, total):
+        weight, total = weights[TERMS - 1 - k], _multiply(matrix, total)
+        return (total[0][0] + weight, total[0][1]), (total[1][0], total[1][1] + weight)
+
+    return _split(jax.lax.fori_loop(0, TERMS, add_term, ((zero, zero), (zero, zero))), 3)
+
+
+def _multiply(a: Matrix, b: Matrix) -> Matrix:
+    (a11, a12), (a21, a22) = a
+    (b11, b12), (b21, b22) = b
+    return (a11 * b11 + a12 * b21, a11 * b12 + a12 * b22), (a21 * b11 + a22 * b21, a21 * b12 + a22 * b22)
+
+
+def _add(a: Matrix, b: Matrix) -> Matrix:
+    return jax.tree.map(jnp.add, a, b)
+
+
+def _scale(factor: Array, matrix: Matrix) -> Matrix:
+    return jax.tree.map(lambda entry: factor * entry, matrix)

@@ -27,12 +27,20 @@ def staircase(key: Array, samples: int, amplitude: float = 1.0, hold: int = 20) 
 
 def multilevel(key: Array, samples: int, amplitude: float = 1.0, hold: int = 20) -> Wheels:
     """Levels uniform in [-amplitude, amplitude], each held `hold` samples."""
-    return _both(key, lambda k: _hold(jax.random.uniform(k, (-(-samples // hold),), minval=-1.0), samples, hold), amplitude)
+
+    def wave(k: Array) -> Array:
+        return _hold(jax.random.uniform(k, (-(-samples // hold),), minval=-1.0), samples, hold)
+
+    return _both(key, wave, amplitude)
 
 
 def prbs(key: Array, samples: int, amplitude: float = 1.0, hold: int = 20) -> Wheels:
     """Pseudo-random binary: plus or minus the amplitude. Two levels cannot show a static curve or a dead zone."""
-    return _both(key, lambda k: _hold(jax.random.rademacher(k, (-(-samples // hold),), float), samples, hold), amplitude)
+
+    def wave(k: Array) -> Array:
+        return _hold(jax.random.rademacher(k, (-(-samples // hold),), float), samples, hold)
+
+    return _both(key, wave, amplitude)
 
 
 def multisine(key: Array, samples: int, amplitude: float = 1.0, hold: int = 20) -> Wheels:
@@ -50,15 +58,14 @@ def multisine(key: Array, samples: int, amplitude: float = 1.0, hold: int = 20) 
 
 
 def chirp(key: Array, samples: int, amplitude: float = 1.0, hold: int = 20) -> Wheels:
-    """Sines whose frequency rises linearly from one period in the run to one period in 2 `hold` samples."""
+    """Sines whose frequency rises linearly from one period in the run to one period in 2 `hold` samples.
 
-    def wave(k: Array) -> Array:
-        time = jnp.arange(samples) / samples
-        last = max(samples / (2.0 * hold), 1.0)
-        phase = jax.random.uniform(k, maxval=2.0 * jnp.pi)
-        return jnp.sin(2.0 * jnp.pi * (time + 0.5 * (last - 1.0) * time**2) + phase)
-
-    return _both(key, wave, amplitude)
+    The wheels are a quarter period apart: drawn apart, their phases could agree and the two move in step.
+    """
+    time = jnp.arange(samples) / samples
+    last = max(samples / (2.0 * hold), 1.0)
+    phase = jax.random.uniform(key, maxval=2.0 * jnp.pi) + 2.0 * jnp.pi * (time + 0.5 * (last - 1.0) * time**2)
+    return Wheels(amplitude * jnp.sin(phase), amplitude * jnp.cos(phase))
 
 
 EXCITATIONS: dict[str, Callable[..., Wheels]] = {

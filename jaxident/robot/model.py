@@ -4,10 +4,21 @@ import dataclasses
 from typing import Any, NamedTuple
 
 import jax
+import jax.numpy as jnp
 
+from jaxident.array_types import Array
 from jaxident.robot.difference import Difference, to_difference
 from jaxident.robot.drive import Physical
 from jaxident.robot.noise import Noise
+
+
+DIFFERENCE_ORDER = (
+    "alpha_1", "alpha_2",
+    "delta_11", "delta_12", "delta_21", "delta_22",
+    "epsilon_11", "epsilon_12", "epsilon_21", "epsilon_22",
+    "dead_zone_r", "dead_zone_l",
+)  # fmt: skip
+"""Names of the twelve numbers of (13)-(14) with their dead zones, in the order of `difference_vector`."""
 
 
 class Provenance(NamedTuple):
@@ -17,8 +28,6 @@ class Provenance(NamedTuple):
     method: str = ""
     logs: tuple[str, ...] = ()
     seed: int | None = None
-
-
 
 
 class Spread(NamedTuple):
@@ -88,3 +97,8 @@ class Model:
     def epsilon(self):
         """Second numerator coefficients (2, 2), with the sign of (13)-(14) [m, rad per unit of command]."""
         return self.difference.epsilon
+
+
+def difference_vector(difference: Difference, dead_zone: Array) -> Array:
+    """The twelve numbers of (13)-(14) and the dead zones as one array (12,), in DIFFERENCE_ORDER."""
+    return jnp.concatenate([jnp.ravel(jnp.asarray(part)) for part in (*difference, dead_zone)])

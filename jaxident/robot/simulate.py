@@ -1,15 +1,14 @@
 """The nominal simulator: commands in, true states and camera poses out."""
 
-
 import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import AT_REST, Array, Increment, Pose, State, Wheels
 from jaxident.errors import InputError
-from jaxident.log import EVEN_TOLERANCE, Log, even_period
+from jaxident.log import EVEN_TOLERANCE, Log, even_period, first_rows
 from jaxident.robot.dead_zone import effective_command
 from jaxident.robot.difference import Difference, predict_increment
-from jaxident.robot.drive import Force, Physical, advance, force, hold
+from jaxident.robot.drive import Force, Hold, Physical, advance, force, hold
 from jaxident.robot.model import Model
 from jaxident.robot.noise import UnitNoise, draw_noise, observe, slip
 from jaxident.robot.path_length import follow
@@ -19,11 +18,13 @@ def simulate(model: Model, log: Log, *, start: State = AT_REST, key: Array | Non
     """The log that `model` would have produced under the commands and times of `log` (one run, all arrays (samples,)).
 
     Noise-free without a key; with one, slip and camera noise are drawn by the model's noise law. Steps may differ
-    for a physical model; a model of free numerators refuses a log of another or an uneven period (InputError).
-    Differentiable in the model and the start. Needs double precision only for long runs.
+    for a physical model; a model of free numerators refuses a log of another or an uneven period (InputError), and
+    both refuse a log of several runs, each of which has a start of its own. Differentiable in the model and the
+    start. Needs double precision only for long runs.
     """
     if model.effects:
         raise InputError(f"effect {model.effects[0].name!r}: this simulator runs nominal models only")
+    _check_one_run(log)
     unit = None if key is None or model.noise is None else draw_noise(key, len(log.t))
     if isinstance(model.dynamics, Physical):
         step = jnp.diff(jnp.asarray(log.t))
@@ -44,19 +45,18 @@ def run_physical(model: Model, command: Wheels, step: Array, start: State, unit:
     if unit is not None:
         noise = slip(model.noise, UnitNoise(*(draw[:-1] for draw in unit)), step)
         pull = Force(pull.along + noise.along, pull.heading + noise.heading)
-    return run_forces(model.dynamics, pull, step, start)
+    return run_forces(hold(model.dynamics, jnp.asarray(step)), pull, start)
 
 
-def run_forces(physical: Physical, pull: Force, step: Array, start: State) -> State:
-    """States (samples + 1,) under given forces (samples,); step [s] scalar or (samples,)."""
-    even = jnp.ndim(step) == 0
-    solution = hold(physical, jnp.asarray(step))
+def run_forces(solution: Hold, pull: Force, start: State) -> State:
+    """States (samples + 1,) under given forces (samples,), from the exact solution of one step or of each."""
+    even = jnp.ndim(solution.step) == 0
 
     def body(state, now):
         pull, own = now
         return advance(state, pull, solution if even else own), state
 
-    start = State(*(jnp.asarray(s, dtype=jnp.result_type(float)) + 0.0 * pull.along[0] for s in start))
+    start = State(*(s + jnp.zeros(pull.along.shape[1:]) for s in start))
     last, states = jax.lax.scan(body, start, (pull, None if even else solution))
     return State(*(jnp.append(column, end) for column, end in zip(states, last, strict=True)))
 
@@ -71,13 +71,13 @@ def free_run(difference: Difference, dead_zone: Array, command: Wheels, before: 
     """Increments (samples - 1,) between the rows, each from the model's own last one; `before` is the one that ended
     at the first row, when nothing was commanded yet."""
     passed = effective_command(Wheels(*(jnp.asarray(u)[:-1] for u in command)), dead_zone)
-    passed_before = Wheels(*(jnp.concatenate([jnp.zeros(1), m[:-1]]) for m in passed))
+    passed_before = Wheels(*(jnp.concatenate([jnp.zeros_like(m[:1]), m[:-1]]) for m in passed))
 
     def body(last, now):
         new = predict_increment(difference, last, *now)
         return new, new
 
-    before = Increment(*(b + 0.0 * passed.right[0] for b in before))
+    before = Increment(*(b + jnp.zeros(passed.right.shape[1:]) for b in before))
     return jax.lax.scan(body, before, (passed, passed_before))[1]
 
 
@@ -91,3 +91,12 @@ def check_period(model: Model, log: Log) -> None:
             f"sample_period: the model has free numerators and lives at {float(model.sample_period):.6g} s, "
             f"the log has {period:.6g} s; identify a physical model, or convert the log to the model's period"
         )
+
+
+def _check_one_run(log: Log) -> None:
+    """InputError for a log of several runs; traced run numbers pass."""
+    if isinstance(log.run, jax.core.Tracer):
+        return
+    runs = first_rows(log).sum()
+    if runs > 1:
+        raise InputError(f"the log holds {runs} runs, each with a start of its own: simulate `log.runs()` one by one")

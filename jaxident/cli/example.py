@@ -1,0 +1,37 @@
+"""`jaxident example`."""
+
+import os
+
+import click
+
+from jaxident.cli.session import seed_option, start_jax, wrote
+
+
+@click.command()
+@click.option("--out", default="example", show_default=True, metavar="DIR", help="The folder to write.")
+@seed_option
+def command(out, seed):
+    """Small example logs of a simulated robot: six runs of 1000 rows with camera noise.
+
+    The robot is drawn near the published one; what it was is kept in DIR/.answer.json, a model file.
+
+    Example: jaxident example --out example && jaxident identify example
+    """
+    start_jax()
+    import jax  # noqa: PLC0415
+
+    from jaxident.files.atomic import make_folder  # noqa: PLC0415
+    from jaxident.files.logs import write_log  # noqa: PLC0415
+    from jaxident.files.models import load_model, save_model  # noqa: PLC0415
+    from jaxident.study.example import example_robot, example_runs  # noqa: PLC0415
+
+    make_folder(out)
+    key_robot, key_runs = jax.random.split(jax.random.key(seed))
+    robot = example_robot(key_robot, load_model("published"))
+    for number, run in enumerate(example_runs(key_runs, robot), start=1):
+        path = os.path.join(out, f"real_{number}.csv")
+        write_log(run, path)
+        wrote(path)
+    answer = os.path.join(out, ".answer.json")
+    save_model(robot, answer)
+    wrote(answer)

@@ -1,0 +1,89 @@
+"""The program: finds the command, and turns every way of ending badly into one line and an exit code."""
+
+import importlib
+import os
+import sys
+import warnings
+
+import click
+
+COMMANDS = {
+    "reproduce": "The paper's robot, excitation and method, beside its published table.",
+    "example": "Write small example logs of a simulated robot.",
+    "simulate": "Synthetic logs from a model.",
+    "convert": "Two streams, commands and poses, to one log.",
+    "identify": "The model behind one or several logs.",
+    "predict": "Free-run prediction of a log by a model.",
+}
+
+
+class LazyGroup(click.Group):
+    """Commands by name alone: nothing heavy is imported before one of them runs."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """All command names, in the order of COMMANDS."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """The command, its module imported now; None for an unknown name."""
+        if cmd_name not in COMMANDS:
+            return None
+        return importlib.import_module(f"jaxident.cli.{cmd_name}").command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The list of commands in --help, without importing any."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+@click.command(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(package_name="jaxident", message="%(prog)s %(version)s")
+def program() -> None:
+    """What is the model of a differential-drive robot, how sure are we, and what does the model miss?
+
+    From motor commands and camera poses. Example: `jaxident reproduce`, then `jaxident identify --help`.
+    """
+
+
+def run() -> None:
+    """Entry point of `jaxident` and `python -m jaxident`: exit 0 done, 2 wrong use or bad input, 1 the work failed."""
+    warnings.showwarning = lambda message, *_, **__: print(f"warning: {message}", file=sys.stderr)
+    try:
+        code = program.main(prog_name="jaxident", standalone_mode=False)
+        sys.stdout.flush()
+    except BaseException as error:
+        code = _explain(error)
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _explain(error: BaseException) -> int:
+    """Print one line on stderr for what ended the program, and return the exit code."""
+    from jaxident.errors import InputError, WorkError  # noqa: PLC0415 the help page needs neither
+
+    if isinstance(error, SystemExit | click.exceptions.Exit):
+        return int(getattr(error, "exit_code", getattr(error, "code", 0)) or 0)
+    if isinstance(error, BrokenPipeError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    if os.environ.get("JAXIDENT_TRACEBACK"):
+        raise error
+    if isinstance(error, KeyboardInterrupt | click.Abort):
+        return _say("stopped", 130)
+    if isinstance(error, click.UsageError):
+        return _say(f"{error.format_message()} (see `{_where(error)} --help`)", 2)
+    if isinstance(error, InputError | click.ClickException):
+        return _say(str(error.format_message() if isinstance(error, click.ClickException) else error), 2)
+    if isinstance(error, WorkError):
+        return _say(str(error), 1)
+    if isinstance(error, MemoryError):
+        return _say("out of memory", 1)
+    return _say(f"{type(error).__name__}: {error} (JAXIDENT_TRACEBACK=1 shows where)", 1)
+
+
+def _where(error: click.UsageError) -> str:
+    return error.ctx.command_path if error.ctx else "jaxident"
+
+
+def _say(line: str, code: int) -> int:
+    print(f"jaxident: {' '.join(line.split())}", file=sys.stderr)
+    return code

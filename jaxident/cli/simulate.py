@@ -1,0 +1,61 @@
+"""`jaxident simulate`."""
+
+import click
+
+from jaxident.cli.session import seed_option, start_jax, wrote
+
+EXCITATION_NAMES = ("staircase", "multilevel", "prbs", "multisine", "chirp")
+
+
+class Noise(click.ParamType):
+    """POS,HEAD: two standard deviations."""
+
+    name = "POS,HEAD"
+
+    def convert(self, value, param, ctx):
+        """A pair of numbers that are not negative."""
+        try:
+            position, heading = (float(part) for part in value.split(","))
+        except ValueError:
+            self.fail(f"{value!r} is not POS,HEAD: two numbers, metres and radians, as in 0.001,0.01", param, ctx)
+        if not (0.0 <= position < float("inf") and 0.0 <= heading < float("inf")):
+            self.fail(f"{value!r}: standard deviations are finite and not negative", param, ctx)
+        return position, heading
+
+
+@click.command()
+@click.argument("model")
+@click.option("--inputs", metavar="LOG", help="Take times and commands from this log (`-`: standard input).")
+@click.option("--excitation", type=click.Choice(EXCITATION_NAMES), help="Make the commands instead.")
+@click.option("--samples", type=click.IntRange(2), help="Length of the excitation, in rows.")
+@click.option("--amplitude", type=click.FloatRange(0, min_open=True), default=1.0, show_default=True)
+@click.option("--hold", type=click.IntRange(1), default=20, show_default=True, help="Samples that a level lasts.")
+@click.option("--noise", type=Noise(), help="Camera noise in metres and radians; without it the log is noise-free.")
+@click.option("--out", required=True, metavar="LOG", help="The log to write (.csv or .csv.gz).")
+@seed_option
+def command(model, inputs, excitation, samples, amplitude, hold, noise, out, seed):
+    """A synthetic log of MODEL, a model file or `published`.
+
+    Random slip and the noise's correlation time come from the model file, and count only with --noise.
+
+    Example: jaxident simulate published --excitation staircase --samples 2000 --noise 0.001,0.01 --out log.csv
+    """
+    if (inputs is None) == (excitation is None):
+        raise click.UsageError("give either --inputs LOG or --excitation NAME")
+    if (excitation is None) != (samples is None):
+        raise click.UsageError("--excitation and --samples N go together")
+    start_jax()
+    import jax  # noqa: PLC0415
+
+    from jaxident.files.logs import read_log, write_log  # noqa: PLC0415
+    from jaxident.files.models import load_model  # noqa: PLC0415
+    from jaxident.study.synthetic import excite, simulate_runs  # noqa: PLC0415
+
+    robot = load_model(model)
+    key_input, key_noise = jax.random.split(jax.random.key(seed))
+    if inputs is None:
+        log = excite(key_input, excitation, samples, robot.sample_period, amplitude=amplitude, hold=hold)
+    else:
+        log = read_log(inputs)
+    write_log(simulate_runs(robot, log, noise=noise, key=key_noise), out)
+    wrote(out)

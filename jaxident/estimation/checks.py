@@ -1,0 +1,39 @@
+"""What a log must have before anything can be estimated from it."""
+
+import numpy as np
+
+from jaxident.errors import InputError
+from jaxident.log import Log
+
+STILL_RATIO = 2.0
+"""A robot that moves is displaced over many rows by more than this times its row-to-row camera error."""
+
+
+def check_informative(log: Log) -> None:
+    """InputError with the reason if the log cannot show how the robot answers its commands."""
+    seen = np.isfinite(log.x) & np.isfinite(log.y) & np.isfinite(log.theta)
+    if np.count_nonzero(seen) < 3:
+        raise InputError(f"{np.count_nonzero(seen)} measured poses: at least 3 are needed to see any motion")
+    if all(np.ptp(np.asarray(u)) == 0.0 for u in log.command):
+        raise InputError("no excitation: both commands are constant, so nothing shows how the robot answers them")
+    if not moves(log, seen):
+        raise InputError("nothing moves: the poses are at rest within the camera's noise while the commands change")
+
+
+def moves(log: Log, seen: np.ndarray) -> bool:
+    """Whether displacement grows with the time between poses, as motion does and camera noise does not."""
+    tracks = [
+        np.stack([run.x, run.y, np.unwrap(run.theta)])
+        for run in Log(*(np.asarray(column)[seen] for column in log)).runs()
+        if len(run.t) > 1
+    ]
+    longest = max((track.shape[1] for track in tracks), default=0)
+    lags = [2**k for k in range(longest.bit_length()) if 2**k < longest]
+    spread = np.array([_displacement(tracks, lag) for lag in lags])
+    return bool(lags) and bool(np.any(spread.max(axis=0) > STILL_RATIO * spread[0]))
+
+
+def _displacement(tracks: list[np.ndarray], lag: int) -> np.ndarray:
+    """Root-mean-square displacement [m], [rad] over `lag` measured poses."""
+    moved = np.concatenate([track[:, lag:] - track[:, :-lag] for track in tracks], axis=1)
+    return np.sqrt(np.array([np.mean(moved[0] ** 2 + moved[1] ** 2), np.mean(moved[2] ** 2)]))

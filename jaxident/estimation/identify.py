@@ -1,0 +1,176 @@
+"""One identification from start to end: logs in, model out."""
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxident.array_types import Array, Increment, Wheels
+from jaxident.errors import InputError, WorkError
+from jaxident.estimation import recursive
+from jaxident.estimation.checks import check_informative
+from jaxident.estimation.initialise import Setup, initialise
+from jaxident.estimation.observations import Observations, observe_log
+from jaxident.log import Log, even_period, join
+from jaxident.numerics import require_float64
+from jaxident.robot.model import DIFFERENCE_ORDER, Model, Provenance, Spread, difference_vector
+
+SETUP_SAMPLES = 200
+SETUP_SHARE = 0.2
+SMALLEST_LOG = 20
+D_MAX_SHARE = 0.9
+
+
+class History(NamedTuple):
+    """The recursion after each sample (samples,): parameters in DIFFERENCE_ORDER and their standard deviations, each
+    (samples, 12), and what the sample taught."""
+
+    parameters: Any
+    standard_deviation: Any
+    used: Any
+
+
+class Identification(NamedTuple):
+    """A model, the covariance of its parameters in `model.parameter_order`, one-step residuals [m], [rad] (samples,)
+    with NaN where a sample was not used, and how the estimate came about. ok: every stage converged."""
+
+    model: Model
+    covariance: Any
+    residuals: Increment
+    setup: Setup
+    history: History
+    ok: Any
+
+
+def identify(
+    logs: Log | Sequence[Log],
+    method: str = "paper",
+    *,
+    setup_time: float | None = None,
+    forgetting: float = 1.0,
+    d_max: float | None = None,
+    reading: str = "free_run",
+) -> Identification:
+    """The model of the robot behind one or several logs, runs in the order given.
+
+    method "paper": batch initialisation on the setup time (section VI), then recursive least squares (15)-(18) over
+    the rest. setup_time [s] counts from the start (default: 200 samples or a fifth, whichever is more); forgetting
+    in (0, 1]; d_max bounds the dead zones [unit of the command] (default: 0.9 of the largest command); reading of
+    (21): "free_run" or "one_step". Needs double precision and an even log; InputError says what a log lacks,
+    WorkError that the result is not finite.
+    """
+    require_float64("identify")
+    if method != "paper":
+        raise InputError(f"method {method!r}: this version knows 'paper'")
+    log = join(logs)
+    check_informative(log)
+    period = even_period(log)
+    largest = float(np.max(np.abs(np.stack(log.command))))
+    d_max = D_MAX_SHARE * largest if d_max is None else d_max
+    check_settings(forgetting, d_max, largest)
+    setup_rows = count_setup_rows(log, period, setup_time)
+    estimate, setup, history, residuals, covariance = identify_recursively(
+        Log(*(jnp.asarray(column) for column in log)), setup_rows, d_max, forgetting, reading
+    )
+    difference, dead_zone = recursive.parameters(estimate)
+    if not all(np.all(np.isfinite(a)) for a in (*difference, dead_zone, covariance)):
+        raise WorkError("the recursive estimate is not finite: the log does not determine the model")
+    model = Model(
+        period,
+        difference,
+        dead_zone,
+        standard_deviation=_spread(jnp.sqrt(jnp.diagonal(covariance))),
+        covariance=covariance,
+        parameter_order=DIFFERENCE_ORDER,
+        provenance=Provenance(method=method),
+    )
+    return Identification(model, covariance, residuals, setup, history, setup.ok)
+
+
+def check_settings(forgetting: float, d_max: float, largest: float) -> None:
+    """InputError for a forgetting factor outside (0, 1] or a dead-zone bound outside (0, largest command)."""
+    if not 0.0 < forgetting <= 1.0:
+        raise InputError(f"forgetting {forgetting:g}: the factor lies above 0 and at most at 1")
+    if not 0.0 < d_max < largest:
+        raise InputError(f"d-max {d_max:g}: the bound lies above 0 and below the largest command, {largest:g}")
+
+
+def count_setup_rows(log: Log, period: float, setup_time: float | None) -> int:
+    """How many rows the setup time covers."""
+    rows = len(log.t)
+    if rows < SMALLEST_LOG:
+        raise InputError(f"{rows} rows: the method needs at least {SMALLEST_LOG}")
+    if setup_time is None:
+        return min(rows, max(SETUP_SAMPLES, int(SETUP_SHARE * rows)))
+    if setup_time < SMALLEST_LOG * period:
+        raise InputError(f"setup time {setup_time:g} s: at least {SMALLEST_LOG} samples, {SMALLEST_LOG * period:g} s")
+    return min(rows, round(setup_time / period))
+
+
+@partial(jax.jit, static_argnames=("setup_rows", "reading"))
+def identify_recursively(log: Log, setup_rows: int, d_max: Array, forgetting: Array, reading: str):
+    """Section VI on the first rows, then the recursion over the rest: pure, for one log of arrays (samples,).
+
+    Returns the last estimate, the setup, the history and residuals after the setup, and the covariance (12, 12).
+    """
+    observations = observe_log(log)
+    early = jax.tree.map(lambda column: column[: setup_rows - 1], observations)
+    setup = initialise(early, d_max=d_max, reading=reading)
+    estimate = recursive.start(setup.difference, setup.dead_zone, early, d_max, forgetting)
+    late = recursive.tail(observations, setup_rows - 1)
+    estimate, (steps, info) = recursive.run(estimate, late)
+    variance = _noise_variance(info, setup)
+    history = jax.vmap(lambda one: _summary(one, variance))(steps)
+    history = History(*history, info.used)
+    covariance = _covariance(estimate, variance)
+    residuals = Increment(*(jnp.where(info.used, e, jnp.nan) for e in info.error))
+    return estimate, setup, history, residuals, covariance
+
+
+def _noise_variance(info: recursive.Info, setup: Setup) -> Increment:
+    """Variance of each equation's error, from the normalised prediction errors; the setup's where none followed."""
+    used = jnp.sum(info.used)
+    return Increment(
+        *(
+            jnp.where(used > 0, jnp.sum(jnp.where(info.used, e**2 / s, 0.0)) / jnp.maximum(used, 1), w**2)
+            for e, s, w in zip(info.error, info.scale, setup.weight, strict=True)
+        )
+    )
+
+
+def _covariance(estimate: recursive.Estimate, variance: Increment) -> Array:
+    """Covariance (12, 12) in DIFFERENCE_ORDER: that of both equations' unknowns, carried to first order.
+
+    The dead zones enter as the unbounded average: at a bound the clipped one would claim to be certain.
+    """
+
+    def from_unknowns(unknowns):
+        length, turn = (e._replace(unknowns=u) for e, u in zip((estimate.length, estimate.turn), unknowns, strict=True))
+        moved = estimate._replace(length=length, turn=turn)
+        ratios = recursive.dead_zone_ratios(moved)
+        average = Wheels(*(0.5 * (first + second) for first, second in zip(*ratios, strict=True)))
+        return difference_vector(*recursive.parameters(moved._replace(dead_zone=average)))
+
+    unknowns = (estimate.length.unknowns, estimate.turn.unknowns)
+    slopes = jax.jacfwd(from_unknowns)(unknowns)
+    total = 0.0
+    for slope, equation, v in zip(slopes, (estimate.length, estimate.turn), variance, strict=True):
+        columns = jnp.stack(slope, axis=-1)
+        total = total + v * columns @ recursive.full_covariance(equation) @ columns.T
+    return total
+
+
+def _summary(estimate: recursive.Estimate, variance: Increment) -> tuple[Array, Array]:
+    return difference_vector(*recursive.parameters(estimate)), jnp.sqrt(jnp.maximum(jnp.diagonal(_covariance(estimate, variance)), 0.0))
+
+
+def _spread(deviation: Array) -> Spread:
+    return Spread(
+        alpha=deviation[:2],
+        delta=deviation[2:6].reshape(2, 2),
+        epsilon=deviation[6:10].reshape(2, 2),
+        dead_zone=deviation[10:],
+    )

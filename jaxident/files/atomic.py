@@ -1,0 +1,125 @@
+"""Files that appear whole or not at all.
+
+The content goes to a hidden file in the same folder, is forced to the disk and then takes the target's name in one
+step. A pipe or a device (/dev/stdout) has no such step and is written as it stands.
+"""
+
+import codecs
+import contextlib
+import errno
+import gzip
+import os
+import pathlib
+import secrets
+from collections.abc import Iterator
+from typing import BinaryIO
+
+from jaxident.errors import InputError, WorkError
+
+Target = str | os.PathLike[str]
+
+GZIP_LEVEL = 6
+_FAILED_WORK = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
+
+
+def check_target(path: Target) -> None:
+    """InputError unless a file of this name can be written; for commands that work long before they write."""
+    with _explained(path):
+        _check(pathlib.Path(path))
+
+
+def make_folder(path: Target) -> None:
+    """Make a folder and those above it where they are missing; InputError where that cannot be."""
+    with _explained(path):
+        os.makedirs(path, exist_ok=True)
+
+
+def write_text(path: Target, text: str) -> None:
+    """Write a text file in UTF-8, gzipped if the name ends in .gz; errors as in `writing_bytes`."""
+    with writing_text(path) as stream:
+        stream.write(text)
+
+
+def write_bytes(path: Target, content: bytes) -> None:
+    """Write a binary file, gzipped if the name ends in .gz; errors as in `writing_bytes`."""
+    with writing_bytes(path) as stream:
+        stream.write(content)
+
+
+@contextlib.contextmanager
+def writing_text(path: Target) -> Iterator[codecs.StreamWriter]:
+    """As `writing_bytes`, for text in UTF-8; line feeds stay as they are."""
+    with writing_bytes(path) as stream:
+        yield codecs.getwriter("utf-8")(stream)
+
+
+@contextlib.contextmanager
+def writing_bytes(path: Target) -> Iterator[BinaryIO]:
+    """A stream whose content becomes the file `path` when the block ends well; gzipped if the name ends in .gz.
+
+    If the block raises, nothing is left behind and an older file stays as it was. The gzip header holds neither
+    name nor time, so that equal content gives equal files. Raises InputError where the target cannot be written
+    (missing folder, no permission, a folder) and WorkError where writing fails (disk full). The block should only
+    write: every OSError in it counts as one of the target.
+    """
+    with _explained(path):
+        target = pathlib.Path(path)
+        _check(target)
+        place = _in_place if target.exists() and not target.is_file() else _renamed
+        with place(target) as raw, _packed(raw, target) as stream:
+            yield stream
+
+
+@contextlib.contextmanager
+def _renamed(target: pathlib.Path) -> Iterator[BinaryIO]:
+    """A hidden file beside the target, which takes its name in the end."""
+    target = pathlib.Path(os.path.realpath(target))  # a link stays, and leads to the new content
+    hidden = target.with_name(f".{secrets.token_hex(8)}.part")
+    try:
+        with open(hidden, "xb") as raw:
+            yield raw
+            raw.flush()
+            os.fsync(raw.fileno())
+        os.replace(hidden, target)
+    finally:
+        hidden.unlink(missing_ok=True)
+
+
+@contextlib.contextmanager
+def _in_place(target: pathlib.Path) -> Iterator[BinaryIO]:
+    with open(target, "wb") as raw:
+        yield raw
+
+
+def _check(target: pathlib.Path) -> None:
+    try:
+        target.stat()
+    except FileNotFoundError:
+        if not target.parent.is_dir():
+            raise InputError(f"{target}: the folder {target.parent} does not exist; make it first") from None
+        writable = target.parent
+    else:
+        writable = target
+    if target.is_dir():
+        raise InputError(f"{target}: is a folder; give the name of a file")
+    if not os.access(writable, os.W_OK):
+        raise InputError(f"{target}: no permission to write {'this file' if writable == target else 'in its folder'}")
+
+
+def _packed(raw: BinaryIO, target: pathlib.Path) -> contextlib.AbstractContextManager[BinaryIO]:
+    """`raw` itself, or the stream that compresses into it."""
+    if target.suffix != ".gz":
+        return contextlib.nullcontext(raw)
+    return gzip.GzipFile("", "wb", GZIP_LEVEL, raw, mtime=0)  # type: ignore[return-value]
+
+
+@contextlib.contextmanager
+def _explained(path: Target) -> Iterator[None]:
+    """OSError as one line: the work failed where the disk is full or broken, the name is wrong otherwise."""
+    try:
+        yield
+    except OSError as error:
+        reason = f"{os.fspath(path)}: cannot be written: {error.strerror or error}"
+        if error.errno in _FAILED_WORK:
+            raise WorkError(f"{reason}; nothing was left behind") from error
+        raise InputError(reason) from error

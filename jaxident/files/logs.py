@@ -1,0 +1,137 @@
+"""Logs on disk: CSV with the header t,u_r,u_l,x,y,theta and, for several runs in one file, an integer column run.
+
+Row k holds the time t_k [s], the command applied from t_k until t_{k+1} and the camera pose at t_k ([m], [m], [rad]).
+"""
+
+import os
+import pathlib
+import re
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from jaxident.errors import InputError
+from jaxident.files.atomic import writing_text
+from jaxident.files.rules import Rule, enforce, pose_rules, rising_time
+from jaxident.files.source import Source, explained
+from jaxident.files.table import read_table
+from jaxident.log import Log, first_rows
+
+COLUMNS = ("t", "u_r", "u_l", "x", "y", "theta")
+LARGEST_RUN = 2**53
+"""Beyond this double precision no longer tells one integer from the next."""
+ROWS_PER_BLOCK = 1 << 16
+
+
+def read_log(path: Source) -> Log:
+    """One log with all runs of a file, all arrays (rows,) float64, run int64; "-" is the standard input.
+
+    Empty pose cells are NaN. The command of the last row of a run may be empty: it is never applied and is read as
+    a repeat of the command before (0 in a run of a single row). Further columns are ignored with a UserWarning.
+    InputError in one line names the file, the line and what would be right.
+    """
+    table = read_table(path, [COLUMNS], optional=("run",))
+    columns = {"run": np.zeros(len(table.line))} | table.columns
+    log = Log(**columns)
+    _check(log, table.name, table.place)
+    u_r, u_l = (_repeat_last(command, log.run) for command in log.command)
+    return log._replace(u_r=u_r, u_l=u_l, run=log.run.astype(np.int64))
+
+
+def read_logs(paths: Source | Sequence[Source]) -> list[Log]:
+    """The logs of files and folders, in the order of `find_logs`; each may hold several runs."""
+    return [read_log(path) for path in find_logs(paths)]
+
+
+def find_logs(paths: Source | Sequence[Source], prefix: str = "real_") -> list[str]:
+    """The log files among files and folders, in the order given.
+
+    A file stands for itself. A folder stands for its logs (.csv, .csv.gz; not those of its own folders) whose names
+    begin with `prefix` or, if there is none, for every log in it, in natural order: run_2 before run_10. InputError
+    for a folder without logs.
+    """
+    found = []
+    for path in _listed(paths):
+        within = _logs_in(path, prefix) or _logs_in(path, "") if os.path.isdir(path) else [str(path)]
+        if not within:
+            raise InputError(f"{path}: the folder holds no logs (.csv or .csv.gz)")
+        found += within
+    return found
+
+
+def find_simulated(paths: Source | Sequence[Source]) -> list[str]:
+    """The logs sim_* in the folders among the paths, in natural order; there may be none."""
+    return [found for path in _listed(paths) if os.path.isdir(path) for found in _logs_in(path, "sim_")]
+
+
+def write_log(log: Log, path: Source) -> None:
+    """Write a log as CSV, gzipped if the name ends in .gz; the file appears whole or not at all.
+
+    Numbers are the shortest that read back as they are, NaN in a pose is an empty cell; the column run is there
+    only if there is more than one run. InputError for a log that `read_log` would refuse or a target that cannot
+    be written, WorkError if the disk is full.
+    """
+    log = Log(*(np.asarray(column, float) for column in log))
+    _check(log, os.fspath(path), lambda row: f"{os.fspath(path)}, row {row}")
+    several = log.run[0] != log.run[-1]
+    columns = (*log[:-1], log.run.astype(np.int64)) if several else log[:-1]
+    with writing_text(path) as stream:
+        stream.write(",".join((*COLUMNS, "run")[: len(columns)]) + "\n")
+        for start in range(0, len(log.t), ROWS_PER_BLOCK):
+            cells = [repr(column[start : start + ROWS_PER_BLOCK].tolist())[1:-1].split(", ") for column in columns]
+            block = "\n".join(map(",".join, zip(*cells, strict=True)))
+            stream.write(block.replace("nan", "") + "\n")
+
+
+def require_poses(log: Log, name: str) -> None:
+    """InputError naming the log unless the camera saw some run at least twice: less shows no motion."""
+    if all(np.isfinite(np.asarray(run.x)).sum() < 2 for run in log.runs()):
+        raise InputError(f"{name}: no run has two poses; fill the columns x,y,theta where the camera saw the robot")
+
+
+def _listed(paths: Source | Sequence[Source]) -> list[pathlib.Path]:
+    return [pathlib.Path(path) for path in ([paths] if isinstance(paths, str | os.PathLike) else paths)]
+
+
+def _logs_in(folder: pathlib.Path, prefix: str) -> list[str]:
+    """The folder's logs whose names begin with the prefix, hidden files left out, in natural order."""
+    pattern = re.compile(r"(?!\.)" + re.escape(prefix) + r".*\.csv(\.gz)?")
+    with explained(str(folder), "CSV"):
+        logs = [entry for entry in folder.iterdir() if pattern.fullmatch(entry.name) and entry.is_file()]
+    return [str(entry) for entry in sorted(logs, key=_natural)]
+
+
+def _natural(path: pathlib.Path) -> tuple:
+    """Sorting key that compares runs of digits as numbers: the pieces are text and number by turns."""
+    pieces = re.split(r"([0-9]+)", path.name)
+    return tuple(int(piece) if k % 2 else piece for k, piece in enumerate(pieces)), path.name
+
+
+def _repeat_last(command: np.ndarray, run: np.ndarray) -> np.ndarray:
+    """Every missing command replaced by the one of the row before, 0 where that row is of another run."""
+    before = np.concatenate([[0.0], np.where(run[1:] == run[:-1], command[:-1], 0.0)])
+    return np.where(np.isnan(command), before, command)
+
+
+def _check(log: Log, name: str, place: Callable[[int], str]) -> None:
+    """InputError for the first breach of the rules that the rows of a log, all float64, keep between them."""
+    if len(log.t) == 0:
+        raise InputError(f"{name}: has no rows; a log needs two at least")
+    enforce(_rules(log), log._asdict(), place)
+    if first_rows(log).all():
+        raise InputError(f"{name}: no run has two rows; a log needs one that has")
+
+
+def _rules(log: Log) -> Iterator[Rule]:
+    yield Rule("run", ~(log.run == np.round(log.run)) | (np.abs(log.run) >= LARGEST_RUN), "it should be an integer")
+    first = first_rows(log)
+    starts = np.flatnonzero(first)
+    _, new = np.unique(log.run[starts], return_index=True)
+    again = np.zeros(len(first), bool)
+    again[np.delete(starts, new)] = True
+    yield Rule("run", again, "the rows of a run must stand together")
+    yield from rising_time(log.t, first)
+    last = np.append(first[1:], True)
+    for name, command in zip(("u_r", "u_l"), log.command, strict=True):
+        yield Rule(name, ~np.isfinite(command) & ~last, "only a run's last row may have no command")
+    yield from pose_rules(log.pose)

@@ -1,0 +1,170 @@
+"""The sections of a model file, each read and written here.
+
+Readers take what stands in the file and the words that name it in error lines; writers give it back.
+"""
+
+from collections.abc import Callable, Collection
+from typing import Any, TypeVar
+
+import numpy as np
+
+from jaxident.errors import InputError
+from jaxident.files.schema import Shape, take_array, take_keys, take_list, take_number, take_object, take_text
+from jaxident.robot.drive import Physical
+from jaxident.robot.model import Effect, Provenance, Spread
+from jaxident.robot.noise import Noise
+
+SHAPES: dict[str, Shape] = {"alpha": (2,), "delta": (2, 2), "epsilon": (2, 2), "dead_zone": (2,)}
+PHYSICAL_SHAPES: dict[str, Shape] = {"rate": (2,), "gain": (2, 2), "coupling": (2,)}
+_NOISE_NEEDED, _NOISE_FREE = ("position", "heading"), ("correlation_time", "slip_along", "slip_heading")
+
+Written = TypeVar("Written")
+
+
+def or_none(convert: Callable[..., Written], value: Any, *rest: Any) -> Written | None:
+    """The conversion, which leaves a section that is not there (None, null) as it is."""
+    return None if value is None else convert(value, *rest)
+
+
+def to_lists(value: Any) -> Any:
+    """Numbers of any shape as nested lists of Python floats."""
+    return np.asarray(value, float).tolist()
+
+
+def read_physical(value: Any, where: str) -> Physical:
+    """Rate, gain and coupling as arrays; a coupling of zeros is none."""
+    found = take_keys(value, where, ("rate", "gain"), ("coupling",))
+    given = found if found["coupling"] is not None else {**found, "coupling": [0.0, 0.0]}
+    arrays = {key: take_array(given[key], f"{where}.{key}", shape) for key, shape in PHYSICAL_SHAPES.items()}
+    return Physical(arrays["rate"], arrays["gain"], arrays["coupling"] if arrays["coupling"].any() else None)
+
+
+def write_physical(physical: Physical) -> dict[str, Any]:
+    """Rate, gain and coupling as lists; no coupling is one of zeros."""
+    coupling = [0.0, 0.0] if physical.coupling is None else physical.coupling
+    return {"rate": to_lists(physical.rate), "gain": to_lists(physical.gain), "coupling": to_lists(coupling)}
+
+
+def read_noise(value: Any, where: str) -> Noise:
+    """The noise law; a correlation time of zero is none, a slip that is not given is zero."""
+    found = take_keys(value, where, _NOISE_NEEDED, _NOISE_FREE)
+    given = {key: 0.0 if key in _NOISE_FREE and entry is None else entry for key, entry in found.items()}
+    noise = Noise(**{key: take_number(entry, f"{where}.{key}", least=0.0) for key, entry in given.items()})
+    return noise._replace(correlation_time=noise.correlation_time or None)
+
+
+def write_noise(noise: Noise) -> dict[str, Any]:
+    """The noise law; white noise has the correlation time null."""
+    return {key: or_none(to_lists, value) for key, value in noise._asdict().items()}
+
+
+def read_effects(value: Any, where: str, known: Collection[str]) -> tuple[Effect, ...]:
+    """The effects in force, each of them known and named once."""
+    effects = tuple(_read_effect(entry, f"{where}[{k}]") for k, entry in enumerate(take_list(value, where)))
+    names = [effect.name for effect in effects]
+    for k, name in enumerate(names):
+        if name not in known:
+            catalogue = ", ".join(known) or "none here"
+            raise InputError(f"{where}[{k}].name: unknown effect {name!r}; known are: {catalogue}")
+        if name in names[:k]:
+            raise InputError(f"{where}[{k}].name: effect {name!r} stands twice; keep one")
+    return effects
+
+
+def _read_effect(value: Any, where: str) -> Effect:
+    found = take_keys(value, where, ("name", "parameters"), ("standard_deviation",))
+    parameters = {
+        name: take_number(entry, f"{where}.parameters.{name}")
+        for name, entry in take_object(found["parameters"], f"{where}.parameters").items()
+    }
+    return Effect(
+        name=take_text(found["name"], f"{where}.name"),
+        parameters=parameters,
+        standard_deviation=or_none(
+            _read_deviations, found["standard_deviation"], f"{where}.standard_deviation", parameters
+        ),
+    )
+
+
+def _read_deviations(value: Any, where: str, names: Collection[str]) -> dict[str, float | None]:
+    """Standard deviations by name, None where none was estimated."""
+    found = take_keys(value, where, (), tuple(names))
+    return {name: or_none(_take_deviation, found[name], f"{where}.{name}") for name in value}
+
+
+def _take_deviation(value: Any, where: str) -> float:
+    return take_number(value, where, least=0.0)
+
+
+def write_effect(effect: Effect) -> dict[str, Any]:
+    """Name, parameters and their standard deviations."""
+    return {
+        "name": effect.name,
+        "parameters": {name: to_lists(value) for name, value in effect.parameters.items()},
+        "standard_deviation": write_deviations(effect.standard_deviation),
+    }
+
+
+def read_spread(value: Any, where: str) -> Spread:
+    """Standard deviations in the shape of the parameters: None where a whole entry is null, NaN where a number is."""
+    found = take_keys(value, where, (), (*SHAPES, "physical", "noise"))
+    arrays = _read_gapped({key: found[key] for key in SHAPES}, where, SHAPES)
+    return Spread(
+        **arrays,
+        physical=or_none(_read_physical_spread, found["physical"], f"{where}.physical"),
+        noise=or_none(_read_noise_spread, found["noise"], f"{where}.noise"),
+    )
+
+
+def _read_physical_spread(value: Any, where: str) -> Physical:
+    found = take_keys(value, where, ("rate", "gain"), ("coupling",))
+    return Physical(**_read_gapped(found, where, PHYSICAL_SHAPES))
+
+
+def _read_noise_spread(value: Any, where: str) -> Noise:
+    found = take_keys(value, where, (), Noise._fields)
+    return Noise(**{key: or_none(_take_deviation, entry, f"{where}.{key}") for key, entry in found.items()})
+
+
+def _read_gapped(values: dict[str, Any], where: str, shapes: dict[str, Shape]) -> dict[str, np.ndarray | None]:
+    return {
+        key: None if value is None else take_array(value, f"{where}.{key}", shapes[key], least=0.0, gaps=True)
+        for key, value in values.items()
+    }
+
+
+def write_deviations(value: Any) -> Any:
+    """Standard deviations by name and as lists, null for every number that is none or not finite."""
+    if value is None:
+        return None
+    if isinstance(value, Spread | Physical | Noise):
+        return write_deviations(value._asdict())
+    if isinstance(value, dict):
+        return {name: write_deviations(entry) for name, entry in value.items()}
+    if np.ndim(value):
+        return [write_deviations(entry) for entry in value]
+    return float(value) if np.isfinite(value) else None
+
+
+def read_covariance(value: Any, where: str) -> tuple[tuple[str, ...], np.ndarray]:
+    """The order of the parameters and their covariance (parameters, parameters)."""
+    found = take_keys(value, where, ("parameter_order", "matrix"))
+    names = take_list(found["parameter_order"], f"{where}.parameter_order")
+    order = tuple(take_text(name, f"{where}.parameter_order[{k}]") for k, name in enumerate(names))
+    return order, take_array(found["matrix"], f"{where}.matrix", (len(order), len(order)))
+
+
+def write_covariance(matrix: Any, order: tuple[str, ...]) -> dict[str, Any]:
+    """The covariance and the order of its rows and columns."""
+    return {"parameter_order": list(order), "matrix": to_lists(matrix)}
+
+
+def read_provenance(value: Any, where: str) -> Provenance:
+    """Version and method, the logs and the seed or None."""
+    found = take_keys(value, where, (), Provenance._fields)
+    version, method = (take_text(found[key] or "", f"{where}.{key}") for key in ("version", "method"))
+    logs = take_list(found["logs"] or [], f"{where}.logs")
+    seed = found["seed"]
+    if seed is not None and type(seed) is not int:
+        raise InputError(f"{where}.seed: should be an integer or null")
+    return Provenance(version, method, tuple(take_text(log, f"{where}.logs[{k}]") for k, log in enumerate(logs)), seed)

@@ -1,0 +1,14 @@
+"""Predictions as CSV."""
+
+import numpy as np
+
+from jaxident.estimation.predict import Prediction
+from jaxident.files.atomic import Target, writing_text
+
+
+def write_prediction(prediction: Prediction, path: Target) -> None:
+    """Write the columns run,start,step,t,x,y,theta,sd_x,sd_y,sd_theta, whole or not at all."""
+    columns = [np.asarray(column).tolist() for column in prediction]
+    with writing_text(path) as stream:
+        stream.write(",".join(Prediction._fields) + "\n")
+        stream.writelines(",".join(map(repr, row)) + "\n" for row in zip(*columns, strict=True))

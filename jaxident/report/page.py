@@ -1,0 +1,146 @@
+"""From a title, a verdict and sections to one HTML page. All text is escaped; there is no markup in it."""
+
+import base64
+import math
+import struct
+from collections.abc import Sequence
+from html import escape
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jaxident.files.atomic import Target, write_text
+from jaxident.report.look import CSS
+
+NOTHING = "–"
+"""What a table shows for a number that is missing."""
+
+SCALE = 0.72
+"""Size on the page [px] of a dot of a picture: one of 6.3 inches at 150 dots an inch fills the column."""
+
+# Even a page that went wrong loads nothing: the browser allows its own pictures and its own style alone.
+_POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+
+
+class Table(NamedTuple):
+    """Column names and rows of text or numbers; numbers stand to the right, with four digits. None and NaN are
+    missing numbers."""
+
+    columns: Sequence[str]
+    rows: Sequence[Sequence[Any]]
+    caption: str = ""
+
+
+class Figure(NamedTuple):
+    """A picture as the content of a PNG file, what it shows in words (for those who cannot see it), a caption."""
+
+    png: bytes
+    alt: str
+    caption: str = ""
+
+
+class Code(NamedTuple):
+    """Text that stands as it is, in a box: a command, a file, numbers in columns."""
+
+    text: str
+    caption: str = ""
+
+
+class Section(NamedTuple):
+    """A heading and what follows it: paragraphs (str), tables, figures and code in any order."""
+
+    heading: str
+    blocks: Sequence["str | Table | Figure | Code"]
+
+
+class Page(NamedTuple):
+    """A title, the verdict in a sentence, the sections and a closing line such as version and seed."""
+
+    title: str
+    lead: str
+    sections: Sequence[Section]
+    footer: str = ""
+
+
+def render(page: Page) -> str:
+    """The page as HTML; equal pages give equal text."""
+    footer = f"<footer>{escape(page.footer)}</footer>\n" if page.footer else ""
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{escape(page.title)}</title>\n<style>{CSS}</style>\n</head>\n<body>\n<main>\n"
+        f'<header>\n<h1>{escape(page.title)}</h1>\n<p class="lead">{escape(page.lead)}</p>\n</header>\n'
+        f"{''.join(_section(section) for section in page.sections)}{footer}</main>\n</body>\n</html>\n"
+    )
+
+
+def write_page(page: Page, path: Target) -> None:
+    """Write the page to a file, whole or not at all; InputError where it cannot be written."""
+    write_text(path, render(page))
+
+
+def _section(section: Section) -> str:
+    blocks = "".join(_block(block) for block in section.blocks)
+    return f"<section>\n<h2>{escape(section.heading)}</h2>\n{blocks}</section>\n"
+
+
+def _block(block: "str | Table | Figure | Code") -> str:
+    match block:
+        case Table():
+            return _figure(_caption(block.caption) + _table(block))
+        case Figure():
+            return _figure(f'<div class="wide white" tabindex="0">{_image(block)}</div>\n{_caption(block.caption)}')
+        case Code():
+            return _figure(f'<pre tabindex="0"><code>{escape(block.text)}</code></pre>\n{_caption(block.caption)}')
+        case _:
+            return f"<p>{escape(block)}</p>\n"
+
+
+def _figure(content: str) -> str:
+    return f"<figure>\n{content}</figure>\n"
+
+
+def _image(figure: Figure) -> str:
+    """The picture in proportion to its size in dots, so that the text of all pictures is equally large."""
+    width, height = (round(SCALE * size) for size in struct.unpack(">II", figure.png[16:24]))  # of the PNG header
+    source = base64.b64encode(figure.png).decode("ascii")
+    return f'<img width="{width}" height="{height}" alt="{escape(figure.alt)}" src="data:image/png;base64,{source}">'
+
+
+def _table(table: Table) -> str:
+    """A table in a box of its own that scrolls; a column is numeric if all that it holds is."""
+    numeric = [all(_is_number(cell) for cell in column) for column in zip(*table.rows, strict=True)]
+    numeric = numeric or [False] * len(table.columns)
+    head = "".join(_cell("th", name, right) for name, right in zip(table.columns, numeric, strict=True))
+    rows = (
+        "".join(_cell("td", _written(cell), right) for cell, right in zip(row, numeric, strict=True))
+        for row in table.rows
+    )
+    body = "".join(f"<tr>{row}</tr>\n" for row in rows)
+    inner = f"<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody>\n</table>"
+    return f'<div class="wide" tabindex="0">{inner}</div>\n'
+
+
+def _cell(tag: str, text: str, right: bool) -> str:
+    scope = ' scope="col"' if tag == "th" else ""
+    side = ' class="number"' if right else ""
+    return f"<{tag}{scope}{side}>{escape(text)}</{tag}>"
+
+
+def _caption(text: str) -> str:
+    return f"<figcaption>{escape(text)}</figcaption>\n" if text else ""
+
+
+def _is_number(cell: Any) -> bool:
+    return cell is None or np.asarray(cell).dtype.kind in "iuf"
+
+
+def _written(cell: Any) -> str:
+    """A cell as text: whole numbers in full, others with four digits and a proper minus."""
+    if not _is_number(cell):
+        return str(cell)
+    if cell is None or math.isnan(cell):
+        return NOTHING
+    whole = np.asarray(cell).dtype.kind in "iu"
+    return (str(int(cell)) if whole else f"{float(cell):.4g}").replace("-", "\N{MINUS SIGN}")
