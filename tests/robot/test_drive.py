@@ -49,7 +49,7 @@ def test_exact_hold_is_the_fine_integration(step, coupling):
 
 def test_coupling_of_zero_is_no_coupling():
     one, other = (run(Physical(RATE, GAIN, c), PULL, EVEN, START) for c in (None, np.zeros(2)))
-    np.testing.assert_allclose(np.stack(one), np.stack(other), rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(np.stack(one), np.stack(other), rtol=1e-12, atol=1e-12)
 
 
 def test_rate_of_zero_is_an_integrator():

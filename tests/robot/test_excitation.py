@@ -11,28 +11,24 @@ SAMPLES, AMPLITUDE, HOLD = 960, 1.5, 20
 
 
 @pytest.mark.parametrize("name", EXCITATIONS)
-def test_shape_bounds_and_repeatability(name):
-    excite = EXCITATIONS[name]
-    signal = excite(KEY, SAMPLES, AMPLITUDE, HOLD)
-    other = excite(jax.random.key(4), SAMPLES, AMPLITUDE, HOLD)
-    for wheel, again in zip(signal, excite(KEY, SAMPLES, AMPLITUDE, HOLD), strict=True):
-        assert wheel.shape == (SAMPLES,)
-        assert 0.8 * AMPLITUDE < np.max(np.abs(wheel)) <= AMPLITUDE
-        np.testing.assert_array_equal(wheel, again)
-    assert np.any(np.stack(signal) != np.stack(other))
-
-
-@pytest.mark.parametrize("name", EXCITATIONS)
-def test_the_wheels_do_not_move_in_step(name):
-    signals = jax.vmap(lambda key: EXCITATIONS[name](key, SAMPLES))(jax.random.split(KEY, 10))
-    for right, left in zip(*map(np.asarray, signals), strict=True):
+def test_every_signal(name):
+    """Shape, bounds, the same key the same signal, another key another, and two wheels that do not move in step."""
+    program = jax.jit(jax.vmap(lambda key: EXCITATIONS[name](key, SAMPLES, AMPLITUDE, HOLD)))
+    keys = jax.random.split(KEY, 10)
+    signals, again = np.stack(program(keys)), np.stack(program(keys))
+    assert signals.shape == (2, 10, SAMPLES)
+    sizes = np.max(np.abs(signals), axis=2)
+    assert np.all((sizes > 0.7 * AMPLITUDE) & (sizes <= AMPLITUDE))
+    np.testing.assert_array_equal(signals, again)
+    assert np.all(np.any(signals[:, 1:] != signals[:, :1], axis=(0, 2)))
+    for right, left in zip(*signals, strict=True):
         assert abs(np.corrcoef(right, left)[0, 1]) < 0.7
 
 
 @pytest.mark.parametrize("name", EXCITATIONS)
 @pytest.mark.parametrize("samples", [1, 61])
 def test_any_length(name, samples):
-    signal = EXCITATIONS[name](KEY, samples)
+    signal = jax.jit(lambda key: EXCITATIONS[name](key, samples))(KEY)
     assert signal.right.shape == signal.left.shape == (samples,)
     assert np.all(np.isfinite(np.stack(signal)))
 

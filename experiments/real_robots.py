@@ -1,0 +1,105 @@
+"""How far ahead does the paper's model see on real robots?
+
+    python experiments/real_robots.py --data ../shared/data --out real_robots [--robots 1 2]
+
+Five iRobot Create robots (UTIAS MRCLAM dataset 6, Leung et al. 2011; motion capture): identified on the first half of
+each log, predicted 10 s ahead on the second. A Husky (norlab-ulaval DRIVE; lidar): identified on 400 of its windows,
+predicted 1 s ahead on the other 203. Beside it a robot that does what it is told: the last measured pose, moved on
+with the commanded speeds. One picture per robot and a table, errors as medians over the starts.
+"""
+
+import argparse
+import json
+import pathlib
+
+import jax
+
+jax.config.update("jax_enable_x64", True)
+
+import numpy as np  # noqa: E402
+
+import jaxident as ji  # noqa: E402
+from jaxident.estimation.predict import prediction_error  # noqa: E402
+from jaxident.files.streams import merge, read_commands, read_poses  # noqa: E402
+from jaxident.log import Log, between, join  # noqa: E402
+
+CREATE_TRACK = 0.258
+PERIOD = 0.05
+HUSKY_TRACK, HUSKY_WHEEL = 0.5708, 0.165
+
+
+def commanded(log: Log, prediction, track: float, wheel: float = 1.0):
+    """The prediction of a unicycle that moves at the commanded speeds from the last pose seen at each start."""
+    runs = {int(run.run[0]): run for run in log.runs()}
+    columns = {name: np.array(getattr(prediction, name), float) for name in ("x", "y", "theta")}
+    keys = np.stack([prediction.run, prediction.start])
+    for run_number, start in np.unique(keys, axis=1).T:
+        run, rows = runs[int(run_number)], np.flatnonzero((keys[0] == run_number) & (keys[1] == start))
+        seen = np.flatnonzero(np.isfinite(run.x[: start + 1]))[-1]
+        stop = start + len(rows)
+        step = np.diff(run.t[seen : stop + 1])
+        v, w = (run.u_r + run.u_l)[seen:stop] * wheel / 2, (run.u_r - run.u_l)[seen:stop] * wheel / track
+        theta = run.theta[seen] + np.concatenate([[0.0], np.cumsum(w * step)])
+        middle = 0.5 * (theta[1:] + theta[:-1])
+        late = slice(start - seen, None)
+        columns["x"][rows] = (run.x[seen] + np.cumsum(v * step * np.cos(middle)))[late]
+        columns["y"][rows] = (run.y[seen] + np.cumsum(v * step * np.sin(middle)))[late]
+        columns["theta"][rows] = theta[1:][late]
+    return prediction._replace(**columns)
+
+
+def judge(name: str, known: Log, unseen: Log, horizon: int, burn_in: int, baseline, out: pathlib.Path) -> dict:
+    """Identify on one part, predict the other, draw, and return the row of the table."""
+    found = ji.identify(known)
+    prediction = ji.predict(found.model, unseen, horizon, burn_in=burn_in)
+    ours, told = prediction_error(prediction, unseen), prediction_error(baseline(unseen, prediction), unseen)
+    figure, ax = ji.plot.figure(size=(6.3, 5.0))
+    shown = unseen if len(unseen.runs()) == 1 else join(unseen.runs()[:1])
+    first = prediction.run == prediction.run[0]
+    ji.plot.path(shown, type(prediction)(*(column[first] for column in prediction)), ax=ax)
+    ax.set_title(f"{name}: {ours['position_median']:.3g} m off after {ours['seconds']:.3g} s (median)")
+    ji.plot.save(figure, out / f"{name}.png")
+    row = {"robot": name, "seconds": ours["seconds"], "starts": ours["compared"]}
+    for label, summary in (("paper", ours), ("commanded", told)):
+        row[f"{label}_position"], row[f"{label}_heading"] = summary["position_median"], summary["heading_median"]
+    print(row, flush=True)
+    return row
+
+
+def creates(data: pathlib.Path, robots: list[int], out: pathlib.Path) -> list[dict]:
+    """The five Creates, each on its own halves."""
+    rows = []
+    for robot in robots:
+        stem = data / "mrclam" / f"D6_R{robot}"
+        streams = read_commands(f"{stem}_commands.csv.gz"), read_poses(f"{stem}_poses.csv.gz")
+        log = merge(*streams, track=CREATE_TRACK, period=PERIOD)
+        middle = float(log.t[0] + log.t[-1]) / 2
+        halves = between(log, None, middle), between(log, middle, None)
+        rows.append(
+            judge(f"create_{robot}", *halves, 200, 20, lambda u, p: commanded(u, p, CREATE_TRACK), out)
+        )
+    return rows
+
+
+def husky(data: pathlib.Path, out: pathlib.Path) -> dict:
+    """The Husky: whole windows for identification, others for prediction."""
+    runs = ji.read_log(data / "drive_husky" / "husky.csv.gz").runs()
+    known = join([run for k, run in enumerate(runs) if k % 3])
+    unseen = join([run for k, run in enumerate(runs) if not k % 3])
+    return judge("husky", known, unseen, 20, 19, lambda u, p: commanded(u, p, HUSKY_TRACK, HUSKY_WHEEL), out)
+
+
+def main() -> None:
+    """Run all and write the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=pathlib.Path, required=True)
+    parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("real_robots"))
+    parser.add_argument("--robots", type=int, nargs="*", default=[1, 2, 3, 4, 5])
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    rows = [*creates(options.data, options.robots, options.out), husky(options.data, options.out)]
+    (options.out / "table.json").write_text(json.dumps(rows, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()
