@@ -75,9 +75,7 @@ def creates(data: pathlib.Path, robots: list[int], out: pathlib.Path) -> list[di
         log = merge(*streams, track=CREATE_TRACK, period=PERIOD)
         middle = float(log.t[0] + log.t[-1]) / 2
         halves = between(log, None, middle), between(log, middle, None)
-        rows.append(
-            judge(f"create_{robot}", *halves, 200, 20, lambda u, p: commanded(u, p, CREATE_TRACK), out)
-        )
+        rows.append(judge(f"create_{robot}", *halves, 200, 20, lambda u, p: commanded(u, p, CREATE_TRACK), out))
     return rows
 
 

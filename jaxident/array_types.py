@@ -16,10 +16,8 @@ Parameters are small arrays, rows by channel and columns by wheel, as in the mod
 
 from typing import Any, NamedTuple
 
-import jax
-
-Array = jax.Array
-"""A JAX array, or anything NumPy-like that JAX takes in its place."""
+Array = Any
+"""A JAX array, or what JAX takes in its place: a NumPy array, a number. Docstrings say the shape."""
 
 
 class Wheels(NamedTuple):

@@ -93,21 +93,16 @@ def hold_integrals(rate: Array, time: Array) -> tuple[Array, Array, Array]:
 
 
 def solve_positive(matrix: Array, target: Array) -> Array:
-    """The solution (n,) of a positive definite system (n, n), n a handful, by elimination written out.
+    """The solution (n,) of a positive definite system (n, n), n a handful, by Gauss-Jordan elimination.
 
     Plain arithmetic runs over thousands of systems at once under vmap, where LAPACK would be called for each.
     """
     size = matrix.shape[0]
-    rows = [[matrix[i, j] for j in range(size)] + [target[i]] for i in range(size)]
+    table = jnp.concatenate([matrix, target[:, None]], axis=1)
     for i in range(size):
-        for k in range(i + 1, size):
-            factor = rows[k][i] / rows[i][i]
-            rows[k] = [a if j < i else a - factor * b for j, (a, b) in enumerate(zip(rows[k], rows[i], strict=True))]
-    solution: list[Array] = []
-    for i in reversed(range(size)):
-        known = sum(rows[i][i + 1 + k] * x for k, x in enumerate(reversed(solution)))
-        solution.append((rows[i][size] - known) / rows[i][i])
-    return jnp.stack(solution[::-1])
+        pivot_row = table[i] / table[i, i]
+        table = jnp.where((jnp.arange(size) == i)[:, None], pivot_row, table - table[:, i, None] * pivot_row)
+    return table[:, size]
 
 
 def _polynomial(x: Array, coefficients: list[float]) -> Array:

@@ -20,10 +20,10 @@ def command(commands, poses, period, track, pose_offset, hold_timeout, out):
 
     Example: jaxident convert --commands cmd.csv --poses mocap.csv --track 0.26 --period 0.05 --out log.csv
     """
-    import numpy as np  # noqa: PLC0415
+    import numpy as np
 
-    from jaxident.files.logs import write_log  # noqa: PLC0415
-    from jaxident.files.streams import merge, read_commands, read_poses  # noqa: PLC0415
+    from jaxident.files.logs import write_log
+    from jaxident.files.streams import merge, read_commands, read_poses
 
     log = merge(
         read_commands(commands),

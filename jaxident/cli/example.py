@@ -18,12 +18,12 @@ def command(out, seed):
     Example: jaxident example --out example && jaxident identify example
     """
     start_jax()
-    import jax  # noqa: PLC0415
+    import jax
 
-    from jaxident.files.atomic import make_folder  # noqa: PLC0415
-    from jaxident.files.logs import write_log  # noqa: PLC0415
-    from jaxident.files.models import load_model, save_model  # noqa: PLC0415
-    from jaxident.study.example import example_robot, example_runs  # noqa: PLC0415
+    from jaxident.files.atomic import make_folder
+    from jaxident.files.logs import write_log
+    from jaxident.files.models import load_model, save_model
+    from jaxident.study.example import example_robot, example_runs
 
     make_folder(out)
     key_robot, key_runs = jax.random.split(jax.random.key(seed))

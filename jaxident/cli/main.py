@@ -58,7 +58,7 @@ def run() -> None:
 
 def _explain(error: BaseException) -> int:
     """Print one line on stderr for what ended the program, and return the exit code."""
-    from jaxident.errors import InputError, WorkError  # noqa: PLC0415 the help page needs neither
+    from jaxident.errors import InputError, WorkError
 
     if isinstance(error, SystemExit | click.exceptions.Exit):
         return int(getattr(error, "exit_code", getattr(error, "code", 0)) or 0)

@@ -21,21 +21,21 @@ def command(model, log, horizon, burn_in, stride, first, last, out, json_file):
     Example: jaxident predict model.json log.csv --horizon 100 --out predicted.csv
     """
     start_jax()
-    from jaxident.estimation.predict import predict, prediction_error  # noqa: PLC0415
-    from jaxident.files.logs import read_log  # noqa: PLC0415
-    from jaxident.files.models import load_model  # noqa: PLC0415
-    from jaxident.files.predictions import write_prediction  # noqa: PLC0415
-    from jaxident.log import between  # noqa: PLC0415
+    from jaxident.estimation.predict import predict, prediction_error
+    from jaxident.files.logs import read_log
+    from jaxident.files.models import load_model
+    from jaxident.files.predictions import write_prediction
+    from jaxident.log import between
 
     record = between(read_log(log), first, last)
     prediction = predict(load_model(model), record, horizon, burn_in=burn_in, stride=stride)
     write_prediction(prediction, out)
     summary = prediction_error(prediction, record)
     click.echo(
-        f"{summary['starts']} starts; after {summary['seconds']:.4g} s (median over {summary['compared']} starts with a "
-        f"pose there): position error {summary['position_median']:.4g} m, heading error {summary['heading_median']:.4g} rad"
-        if summary["compared"]
-        else f"{summary['starts']} starts; no pose at the horizon to compare with"
+        f"{summary['starts']} starts, {summary['compared']} of them with a pose after {summary['seconds']:.4g} s"
     )
+    if summary["compared"]:
+        errors = f"{summary['position_median']:.4g} m and {summary['heading_median']:.4g} rad"
+        click.echo(f"error there, median: {errors}")
     wrote(out)
     write_json(summary, json_file)

@@ -21,10 +21,10 @@ def command(out, seeds, seed, json_file):
     Example: jaxident reproduce --out reproduction
     """
     start_jax()
-    from jaxident.files.atomic import make_folder  # noqa: PLC0415
-    from jaxident.files.models import load_model  # noqa: PLC0415
-    from jaxident.report.reproduction import write_reproduction  # noqa: PLC0415
-    from jaxident.study.reproduction import reproduce  # noqa: PLC0415
+    from jaxident.files.atomic import make_folder
+    from jaxident.files.models import load_model
+    from jaxident.report.reproduction import write_reproduction
+    from jaxident.study.reproduction import reproduce
 
     make_folder(out)
     result = reproduce(load_model("published"), load_model("published-simplified"), seed=seed, seeds=seeds)

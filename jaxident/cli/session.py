@@ -15,7 +15,7 @@ seed_option = click.option("--seed", default=0, show_default=True, help="Makes e
 
 def start_jax() -> None:
     """Double precision, and compiled code kept between runs (JAXIDENT_CACHE moves it; set but empty turns it off)."""
-    import jax  # noqa: PLC0415 the help pages do without
+    import jax
 
     jax.config.update("jax_enable_x64", True)
     folder = os.environ.get("JAXIDENT_CACHE")

@@ -45,11 +45,11 @@ def command(model, inputs, excitation, samples, amplitude, hold, noise, out, see
     if (excitation is None) != (samples is None):
         raise click.UsageError("--excitation and --samples N go together")
     start_jax()
-    import jax  # noqa: PLC0415
+    import jax
 
-    from jaxident.files.logs import read_log, write_log  # noqa: PLC0415
-    from jaxident.files.models import load_model  # noqa: PLC0415
-    from jaxident.study.synthetic import excite, simulate_runs  # noqa: PLC0415
+    from jaxident.files.logs import read_log, write_log
+    from jaxident.files.models import load_model
+    from jaxident.study.synthetic import excite, simulate_runs
 
     robot = load_model(model)
     key_input, key_noise = jax.random.split(jax.random.key(seed))

@@ -13,7 +13,7 @@ from jaxident.errors import InputError, WorkError
 from jaxident.estimation import recursive
 from jaxident.estimation.checks import check_informative
 from jaxident.estimation.initialise import Setup, initialise
-from jaxident.estimation.observations import Observations, observe_log
+from jaxident.estimation.observations import observe_log
 from jaxident.log import Log, even_period, join
 from jaxident.numerics import require_float64
 from jaxident.robot.model import DIFFERENCE_ORDER, Model, Provenance, Spread, difference_vector
@@ -123,8 +123,8 @@ def identify_recursively(log: Log, setup_rows: int, d_max: Array, forgetting: Ar
     late = recursive.tail(observations, setup_rows - 1)
     estimate, (steps, info) = recursive.run(estimate, late)
     variance = _noise_variance(info, setup)
-    history = jax.vmap(lambda one: _summary(one, variance))(steps)
-    history = History(*history, info.used)
+    parameters, deviations = jax.vmap(lambda one: _summary(one, variance))(steps)
+    history = History(parameters, deviations, info.used)
     covariance = _covariance(estimate, variance)
     residuals = Increment(*(jnp.where(info.used, e, jnp.nan) for e in info.error))
     return estimate, setup, history, residuals, covariance
@@ -164,7 +164,9 @@ def _covariance(estimate: recursive.Estimate, variance: Increment) -> Array:
 
 
 def _summary(estimate: recursive.Estimate, variance: Increment) -> tuple[Array, Array]:
-    return difference_vector(*recursive.parameters(estimate)), jnp.sqrt(jnp.maximum(jnp.diagonal(_covariance(estimate, variance)), 0.0))
+    return difference_vector(*recursive.parameters(estimate)), jnp.sqrt(
+        jnp.maximum(jnp.diagonal(_covariance(estimate, variance)), 0.0)
+    )
 
 
 def _spread(deviation: Array) -> Spread:

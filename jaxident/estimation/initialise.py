@@ -21,18 +21,18 @@ from jaxident.estimation.observations import Observations
 from jaxident.estimation.projection import Projected, free_run_reading, grid_squares, one_step_reading, project
 from jaxident.robot.difference import Difference
 
-GRID = 12
+GRID = 10
 """Dead zones per wheel on the grid that the search starts from."""
 
-POLES = (0.0, 0.4, 0.65, 0.8, 0.88, 0.94, 0.97, 0.985, 0.9925, 0.998)
+POLES = (0.2, 0.6, 0.8, 0.9, 0.96, 0.985, 0.996)
 """Poles per channel on that grid, in free run."""
 
-STARTS = 3
+STARTS = 2
 MAX_STEPS = 12
 RTOL, ATOL = 1e-9, 1e-10
 
 WINDOW = 5
-ZOOMS = 14
+ZOOMS = 12
 """The last search: windows of WINDOW^2 dead zones, each half as wide as the one before."""
 
 SMALLEST_WEIGHT = 1e-9
@@ -131,7 +131,7 @@ def _refine(cost: Cost, d_max: Array, start: Array) -> tuple[Array, Array, Array
     def residual(coordinates, _):
         return (cost.left(_inside(coordinates, d_max)).residual / cost.weight[:, None]).ravel()
 
-    search = optimistix.least_squares(
+    search: optimistix.Solution = optimistix.least_squares(
         residual,
         optimistix.LevenbergMarquardt(RTOL, ATOL, linear_solver=lineax.Normal(lineax.Cholesky())),
         _coordinates(start, d_max),

@@ -14,7 +14,7 @@ from jaxident.numerics import require_float64, wrap
 from jaxident.robot.dead_zone import effective_command
 from jaxident.robot.difference import Difference
 from jaxident.robot.drive import force, hold
-from jaxident.robot.model import Model
+from jaxident.robot.model import Model, require_physical
 from jaxident.robot.simulate import check_period, run_difference, run_forces
 
 ITERATIONS = 8
@@ -95,12 +95,14 @@ def _cut(log: Log, horizon: int, burn_in: int, stride: int) -> tuple[np.ndarray,
 def _free_run(model: Model, window: Window) -> Callable[[Array], Pose]:
     """The poses of a window as a function of its first row's state (x, y, theta, v, w)."""
     if isinstance(model.dynamics, Difference):
+        difference = model.dynamics
         return lambda start: run_difference(
-            model.dynamics, model.dead_zone, window.command, State(*start), model.sample_period
+            difference, model.dead_zone, window.command, State(*start), model.sample_period
         )
     passed = effective_command(Wheels(*(u[:-1] for u in window.command)), model.dead_zone)
-    solution = hold(model.dynamics, jnp.diff(window.t))
-    return lambda start: run_forces(solution, force(model.dynamics, passed), State(*start)).pose
+    drive = require_physical(model)
+    solution, pull = hold(drive, jnp.diff(window.t)), force(drive, passed)
+    return lambda start: run_forces(solution, pull, State(*start)).pose
 
 
 class Fit(NamedTuple):
@@ -124,8 +126,8 @@ def _fit_start(model: Model, window: Window, noise: Array) -> Fit:
     def residual(start):
         pose = poses(start)
         error = (pose.x - window.pose.x, pose.y - window.pose.y, wrap(pose.theta - window.pose.theta))
-        weighted = [jnp.where(known, e / s, 0.0) for e, s in zip(error, scale, strict=True)]
-        weighted = jnp.concatenate([*weighted, start[3:] / SPEED_PRIOR])
+        parts = [jnp.where(known, e / s, 0.0) for e, s in zip(error, scale, strict=True)]
+        weighted = jnp.concatenate([*parts, start[3:] / SPEED_PRIOR])
         return weighted, weighted
 
     def improve(_, now):
@@ -199,7 +201,7 @@ def _flatten(log, numbers, starts, windows, pose, deviation, burn_in) -> Predict
     return Prediction(run, start, step[kept], times, *values)
 
 
-def prediction_error(prediction: Prediction, log: Log) -> dict[str, float | int]:
+def prediction_error(prediction: Prediction, log: Log) -> dict[str, Any]:
     """How far the free runs end from the measured poses, over the longest runs whose last row has a pose."""
     last = np.flatnonzero(prediction.step == prediction.step.max())
     runs = {int(run.run[0]): run for run in log.runs()}
@@ -212,7 +214,7 @@ def prediction_error(prediction: Prediction, log: Log) -> dict[str, float | int]
     ]
     dx, dy, turn = np.array(seen).reshape(-1, 3).T
     position, heading = np.hypot(dx, dy), np.abs((turn + np.pi) % (2.0 * np.pi) - np.pi)
-    summary = {"starts": len(last), "compared": len(seen), "seconds": float(np.median(seconds))}
+    summary: dict[str, Any] = {"starts": len(last), "compared": len(seen), "seconds": float(np.median(seconds))}
     for name, error in (("position", position), ("heading", heading)):
         summary[f"{name}_median"] = float(np.median(error)) if seen else None
         summary[f"{name}_rms"] = float(np.sqrt(np.mean(error**2))) if seen else None

@@ -60,7 +60,9 @@ def free_run_reading(observations: Observations) -> Reading:
         start = jnp.where(observations.measured, start, 0.0)
         energy = jax.ops.segment_sum(start * start, run, len(start))
         signals = jnp.where(observations.measured, jnp.vstack([response, increments]), 0.0)
-        share = jax.ops.segment_sum((signals * start).T, run, len(start)) / jnp.where(energy > 0.0, energy, 1.0)[:, None]
+        share = (
+            jax.ops.segment_sum((signals * start).T, run, len(start)) / jnp.where(energy > 0.0, energy, 1.0)[:, None]
+        )
         signals = signals - start * share[run].T
         return signals[:-1], signals[-1]
 
@@ -94,7 +96,9 @@ def grid_squares(reading: Reading, observations: Observations, rights: Array, le
         gram = table @ table.T
         right, left = jnp.arange(n)[:, None], n + jnp.arange(m)[None, :]
         others = range(2 * (n + m), len(table))
-        rows = [jnp.broadcast_to(row, (n, m)) for row in (right, left, right + n + m, left + n + m, *map(jnp.array, others))]
+        rows = [
+            jnp.broadcast_to(row, (n, m)) for row in (right, left, right + n + m, left + n + m, *map(jnp.array, others))
+        ]
         return _remainder(jnp.stack([jnp.stack([gram[a, b] for b in rows]) for a in rows]))
 
     return jnp.stack([channel(*pair) for pair in zip(poles, observations.increment, strict=True)])
@@ -102,16 +106,12 @@ def grid_squares(reading: Reading, observations: Observations, rights: Array, le
 
 def _remainder(gram: Array) -> Array:
     """The last column's square that the others do not explain, from inner products (columns, columns, ...)."""
-    size = len(gram)
-    rows = [[gram[i, j] for j in range(size)] for i in range(size)]
-    for i in range(size - 1):
-        pivot = jnp.maximum(rows[i][i], RIDGE * gram[i, i])
+    diagonal = jnp.diagonal(gram)
+    for i in range(len(gram) - 1):
+        pivot = jnp.maximum(gram[i, i], RIDGE * diagonal[..., i])
         inverse = jnp.where(pivot > 0.0, 1.0 / jnp.where(pivot > 0.0, pivot, 1.0), 0.0)
-        for k in range(i + 1, size):
-            factor = rows[k][i] * inverse
-            for j in range(i + 1, size):
-                rows[k][j] = rows[k][j] - factor * rows[i][j]
-    return jnp.maximum(rows[-1][-1], 0.0)
+        gram = gram - gram[:, i, None] * gram[i] * inverse
+    return jnp.maximum(gram[-1, -1], 0.0)
 
 
 def _passed(observations: Observations, rights: Array, lefts: Array) -> Array:

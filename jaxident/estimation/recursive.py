@@ -154,11 +154,10 @@ def start(difference: Difference, dead_zone: Array, setup: Observations, d_max: 
     complete = setup.measured is None
     first = Memory(Increment(setup.increment.length[0], setup.increment.turn[0])) if complete else empty_memory()
     memory, information = _information(unknowns, width, first, tail(setup, 1) if complete else setup)
-    smallest = tuple(
-        Wheels(*(CLEAR_OF_ZERO * jnp.abs(slope) for slope in row)) for row in (difference.delta[0], difference.delta[1])
-    )
-    equations = (Equation(u, _inverse(i)) for u, i in zip(unknowns, information, strict=True))
-    return Estimate(*equations, width, memory, smallest, jnp.asarray(forgetting) * 1.0, jnp.asarray(d_max) * 1.0)
+    slopes = CLEAR_OF_ZERO * jnp.abs(jnp.asarray(difference.delta))
+    smallest = Wheels(*slopes[0]), Wheels(*slopes[1])
+    length, turn = (Equation(u, _inverse(i)) for u, i in zip(unknowns, information, strict=True))
+    return Estimate(length, turn, width, memory, smallest, jnp.asarray(forgetting) * 1.0, jnp.asarray(d_max) * 1.0)
 
 
 def run(estimate: Estimate, observations: Observations) -> tuple[Estimate, tuple[Estimate, Info]]:
@@ -191,8 +190,9 @@ def step(state: State, sample: Sample) -> tuple[State, Info]:
     seen = jnp.isfinite(pose.x) & jnp.isfinite(pose.y) & jnp.isfinite(pose.theta)
     measured = seen & state.posed
     pose = Pose(*(jnp.where(seen, new, old) for new, old in zip(pose, state.pose, strict=True)))
-    moved = increment_between(Pose(*(jnp.where(measured, p, 0.0) for p in state.pose)),
-                              Pose(*(jnp.where(measured, p, 0.0) for p in pose)))
+    moved = increment_between(
+        Pose(*(jnp.where(measured, p, 0.0) for p in state.pose)), Pose(*(jnp.where(measured, p, 0.0) for p in pose))
+    )
     observation = Observations(state.command, state.command_before, moved, seen, measured, False, True)
     estimate, info = absorb(state.estimate, observation)
     return State(estimate, Wheels(sample.u_r, sample.u_l), state.command, pose, state.posed | seen), info

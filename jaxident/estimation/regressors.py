@@ -5,6 +5,7 @@ Unknowns of each equation, in this order: [a, d_r, D_r d_r, -e_r, d_l, D_l d_l, 
 
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array, Increment, Wheels
@@ -62,31 +63,35 @@ def empty_memory() -> Memory:
     return Memory(Increment(0.0, 0.0), False, (zero, zero), 0.0)
 
 
-def next_row(memory: Memory, unknowns: tuple[Vector, Vector], width: Wheels, sample: Observations) -> tuple[Row, Memory]:
+def next_row(
+    memory: Memory, unknowns: tuple[Vector, Vector], width: Wheels, sample: Observations
+) -> tuple[Row, Memory]:
     """The row that a sample adds, and the memory after it.
 
     Where no pose is missing this is (15)-(16) as printed. Over a gap the equations of its samples are summed: the
     sum of increments is measured, and the increments inside come from the current estimate, moved by an equal share
     of the sum's error once the next pose arrives. With a gap of one sample the two agree.
     """
-    rows = tuple(key_terms(last, sample.command, sample.command_before, width) for last in memory.past)
+    inputs = sample.command, sample.command_before, width
+    rows = key_terms(memory.past.length, *inputs), key_terms(memory.past.turn, *inputs)
     if memory.total is None:
-        return Row(*rows, sample.increment, None), Memory(sample.increment)
+        return Row(rows[0], rows[1], sample.increment, None), Memory(sample.increment)
     known = memory.known & sample.inside
     count = jnp.where(sample.inside, memory.count + 1.0, 0.0)
-    total = tuple(
-        tuple(jnp.where(known, old + new, 0.0) for old, new in zip(*pair, strict=True))
-        for pair in zip(memory.total, rows, strict=True)
-    )
+    total = _add_where(known, memory.total[0], rows[0]), _add_where(known, memory.total[1], rows[1])
     past = Increment(
         *(
             _last_increment(measured, dot(row, theta), dot(summed, theta), count, known, sample.measured)
             for measured, row, summed, theta in zip(sample.increment, rows, total, unknowns, strict=True)
         )
     )
-    kept = tuple(tuple(jnp.where(sample.seen, 0.0, x) for x in summed) for summed in total)
+    kept = jax.tree.map(lambda x: jnp.where(sample.seen, 0.0, x), total)
     after = Memory(past, known | sample.measured, kept, jnp.where(sample.seen, 0.0, count))
-    return Row(*total, sample.increment, known & sample.measured), after
+    return Row(total[0], total[1], sample.increment, known & sample.measured), after
+
+
+def _add_where(known: Array, total: Vector, row: Vector) -> Vector:
+    return tuple(jnp.where(known, old + new, 0.0) for old, new in zip(total, row, strict=True))
 
 
 def _last_increment(measured, predicted, predicted_sum, count, known, closes):

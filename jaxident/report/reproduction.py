@@ -10,11 +10,10 @@ from jaxident.files.atomic import write_bytes
 from jaxident.report.page import Figure, Page, Section, Table, write_page
 from jaxident.robot.model import DIFFERENCE_ORDER
 from jaxident.robot.path_length import path_length
-from jaxident.robot.simulate import simulate
 from jaxident.study.reproduction import ESTIMATORS, TABLE_NOISE, Reproduction, count_closer
 
 SHOWN_AGAINST_NOISE = ("alpha_1", "alpha_2", "delta_21", "dead_zone_r")
-SHOWN_SAMPLES = slice(0, 600)
+SHOWN_SAMPLES = slice(0, 300)
 
 
 def write_reproduction(result: Reproduction, folder: str) -> list[str]:
@@ -63,33 +62,48 @@ def _figure_7(result: Reproduction) -> Figure:
 def _increments(result: Reproduction, channel: str, number: str) -> Figure:
     """Figure 8 or 9: measured increments against the free run of the identified model."""
     measured = Increment(*(np.asarray(c)[SHOWN_SAMPLES] for c in path_length(result.log.pose)))
-    free_run = simulate(result.found.model, result.log)
-    modelled = Increment(*(np.asarray(c)[SHOWN_SAMPLES] for c in path_length(free_run.pose)))
+    modelled = Increment(*(np.asarray(c)[SHOWN_SAMPLES] for c in path_length(result.modelled.pose)))
     figure, (ax, residual_ax) = plot.figure(2, 1, heights=(3, 1), share_x=True, size=(6.3, 3.6))
     time = np.asarray(result.log.t)[1:][SHOWN_SAMPLES]
     plot.increments(time, measured, modelled, ax=ax, residual_ax=residual_ax, channel=channel)
     word = {"length": "path length", "turn": "turn"}[channel]
-    return _done(figure, f"Measured and modelled {word}", f"Figure {number}: the {word} of each sample, measured and as "
-                 "the identified model runs on its own, without noise.")
+    return _done(
+        figure,
+        f"Measured and modelled {word}",
+        f"Figure {number}: the {word} of each sample, measured and as "
+        "the identified model runs on its own, without noise.",
+    )
 
 
 def _convergence(result: Reproduction) -> Figure:
     history, log = result.found.history, result.log
-    late = np.asarray(log.t)[-len(history.parameters):]
+    late = np.asarray(log.t)[-len(history.parameters) :]
     figure, axes = plot.figure(6, 2, size=(6.9, 9.5), share_x=True)
-    plot.convergence(late, history.parameters, history.standard_deviation, names=DIFFERENCE_ORDER,
-                     truth=[row.true for row in result.rows], axes=axes)
-    return _done(figure, "Parameter convergence", "The recursion after the setup time: estimates with 95 % bands, and the "
-                 "simplified robot's values as dashed lines.")
+    plot.convergence(
+        late,
+        history.parameters,
+        history.standard_deviation,
+        names=DIFFERENCE_ORDER,
+        truth=[row.true for row in result.rows],
+        axes=axes,
+    )
+    return _done(
+        figure,
+        "Parameter convergence",
+        "The recursion after the setup time: estimates with 95 % bands, and the "
+        "simplified robot's values as dashed lines.",
+    )
 
 
 def _path(result: Reproduction) -> Figure:
-    from jaxident.estimation.predict import predict  # noqa: PLC0415
-
     figure, ax = plot.figure(size=(5.2, 4.6))
-    plot.path(result.log, predict(result.found.model, result.log, 60), ax=ax)
-    return _done(figure, "Path and predictions", "The path of the robot with free runs of the identified model over two "
-                 "seconds each, started from what came before.")
+    plot.path(result.log, result.prediction, ax=ax)
+    return _done(
+        figure,
+        "Path and predictions",
+        "The path of the robot with free runs of the identified model over two "
+        "seconds each, started from what came before.",
+    )
 
 
 def _against_noise(result: Reproduction, name: str) -> Figure:
@@ -101,14 +115,19 @@ def _against_noise(result: Reproduction, name: str) -> Figure:
     }
     figure, ax = plot.figure(size=(6.3, 3.8))
     plot.error_against_noise(study.levels, estimates, truth=result.rows[column].true, label=name, ax=ax)
-    return _done(figure, f"Error of {name} against camera noise", f"Error of {name} against camera noise "
-                 f"(10 mrad for each millimetre), {study.estimates.shape[1]} seeds.")
+    return _done(
+        figure,
+        f"Error of {name} against camera noise",
+        f"Error of {name} against camera noise (10 mrad for each millimetre), {study.estimates.shape[1]} seeds.",
+    )
 
 
 def _drift(drift) -> Figure:
     figure, ax = plot.figure(size=(6.3, 3.2))
     plot.tracking(drift.t, drift.truth, drift.estimate, drift.deviation, label=drift.name, ax=ax)
-    return _done(figure, f"Tracking of {drift.name}", f"An ageing robot: {drift.name} and the recursion's estimate of it.")
+    return _done(
+        figure, f"Tracking of {drift.name}", f"An ageing robot: {drift.name} and the recursion's estimate of it."
+    )
 
 
 def _done(figure, alt: str, caption: str) -> Figure:
@@ -123,17 +142,22 @@ def _page(result: Reproduction, figures: dict[str, Figure]) -> Page:
         "estimates; camera noise biases the method, as the curves below show."
     )
     rows = [
-        (row.parameter, *(f"{v:.5g}" for v in (row.true, row.paper, row.ours, row.standard_error))) for row in result.rows
+        (row.parameter, *(f"{v:.5g}" for v in (row.true, row.paper, row.ours, row.standard_error)))
+        for row in result.rows
     ]
     table = Table(("parameter", "true", "the paper's", "ours", "standard error"), rows, TABLE_CAPTION)
     noise = [figures[f"noise_{name}"] for name in SHOWN_AGAINST_NOISE]
-    return Page("The paper's experiment, run again", lead, [
-        Section("Twelve numbers", [table, WHY_NOT_ALL]),
-        Section("The paper's figures", [figures[f"figure_{k}"] for k in (4, 7, 8, 9)]),
-        Section("The recursion", [figures["convergence"], figures["path"]]),
-        Section("What camera noise does", [NOISE_TEXT, *noise]),
-        Section("A robot that ages", [figures[f"drift_{drift.name}"] for drift in result.drifts]),
-    ])
+    return Page(
+        "The paper's experiment, run again",
+        lead,
+        [
+            Section("Twelve numbers", [table, WHY_NOT_ALL]),
+            Section("The paper's figures", [figures[f"figure_{k}"] for k in (4, 7, 8, 9)]),
+            Section("The recursion", [figures["convergence"], figures["path"]]),
+            Section("What camera noise does", [NOISE_TEXT, *noise]),
+            Section("A robot that ages", [figures[f"drift_{drift.name}"] for drift in result.drifts]),
+        ],
+    )
 
 
 TABLE_CAPTION = (

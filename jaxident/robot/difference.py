@@ -1,7 +1,7 @@
 """The same drive as difference equations between camera samples, PAPER (13)-(14), and the way to and fro.
 
-    dl_k     = a1 dl_{k-1}     + d11 m_r,k-1 - e11 m_r,k-2 + d12 m_l,k-1 - e12 m_l,k-2        (13)
-    dtheta_k = a2 dtheta_{k-1} + d21 m_r,k-1 - e21 m_r,k-2 + d22 m_l,k-1 - e22 m_l,k-2        (14)
+dl_k     = a1 dl_{k-1}     + d11 m_r,k-1 - e11 m_r,k-2 + d12 m_l,k-1 - e12 m_l,k-2        (13)
+dtheta_k = a2 dtheta_{k-1} + d21 m_r,k-1 - e21 m_r,k-2 + d22 m_l,k-1 - e22 m_l,k-2        (14)
 """
 
 from typing import Any, NamedTuple

@@ -1,6 +1,6 @@
 """How commands become speeds: the linear drive in physical parameters, solved exactly over a held command.
 
-    [v, w]' = -rate * [v, w] + coupling * [w, v] + gain [m_r, m_l]        l' = v        theta' = w
+[v, w]' = -rate * [v, w] + coupling * [w, v] + gain [m_r, m_l]        l' = v        theta' = w
 """
 
 import math

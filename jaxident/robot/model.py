@@ -7,10 +7,10 @@ import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array
+from jaxident.errors import InputError
 from jaxident.robot.difference import Difference, to_difference
 from jaxident.robot.drive import Physical
 from jaxident.robot.noise import Noise
-
 
 DIFFERENCE_ORDER = (
     "alpha_1", "alpha_2",
@@ -97,6 +97,13 @@ class Model:
     def epsilon(self):
         """Second numerator coefficients (2, 2), with the sign of (13)-(14) [m, rad per unit of command]."""
         return self.difference.epsilon
+
+
+def require_physical(model: Model) -> Physical:
+    """The model's drive in physical parameters; InputError for a model of free numerators."""
+    if isinstance(model.dynamics, Physical):
+        return model.dynamics
+    raise InputError("physical: null; this needs a model with physical parameters, not one of free numerators")
 
 
 def difference_vector(difference: Difference, dead_zone: Array) -> Array:

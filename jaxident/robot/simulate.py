@@ -9,7 +9,7 @@ from jaxident.log import EVEN_TOLERANCE, Log, even_period, first_rows
 from jaxident.robot.dead_zone import effective_command
 from jaxident.robot.difference import Difference, predict_increment
 from jaxident.robot.drive import Force, Hold, Physical, advance, force, hold
-from jaxident.robot.model import Model
+from jaxident.robot.model import Model, require_physical
 from jaxident.robot.noise import UnitNoise, draw_noise, observe, slip
 from jaxident.robot.path_length import follow
 
@@ -33,19 +33,20 @@ def simulate(model: Model, log: Log, *, start: State = AT_REST, key: Array | Non
         check_period(model, log)
         step = model.sample_period
         pose = run_difference(model.dynamics, model.dead_zone, log.command, start, model.sample_period)
-    if unit is not None:
+    if unit is not None and model.noise is not None:
         pose = observe(pose, model.noise, unit, step)
     return log._replace(x=pose.x, y=pose.y, theta=pose.theta)
 
 
 def run_physical(model: Model, command: Wheels, step: Array, start: State, unit: UnitNoise | None = None) -> State:
     """States (samples,) at the rows of a run; step [s] is a scalar, or (samples - 1,) from each row to the next."""
+    drive = require_physical(model)
     held = Wheels(*(jnp.asarray(u)[:-1] for u in command))
-    pull = force(model.dynamics, effective_command(held, model.dead_zone))
-    if unit is not None:
+    pull = force(drive, effective_command(held, model.dead_zone))
+    if unit is not None and model.noise is not None:
         noise = slip(model.noise, UnitNoise(*(draw[:-1] for draw in unit)), step)
         pull = Force(pull.along + noise.along, pull.heading + noise.heading)
-    return run_forces(hold(model.dynamics, jnp.asarray(step)), pull, start)
+    return run_forces(hold(drive, jnp.asarray(step)), pull, start)
 
 
 def run_forces(solution: Hold, pull: Force, start: State) -> State:

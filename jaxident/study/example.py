@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxident.array_types import Array
 from jaxident.log import Log
 from jaxident.robot.drive import Physical
-from jaxident.robot.model import Model, Provenance
+from jaxident.robot.model import Model, Provenance, require_physical
 from jaxident.robot.noise import Noise
 from jaxident.study.synthetic import excite, simulate_runs
 
@@ -24,7 +24,8 @@ VARIATION = 0.2
 def example_robot(key: Array, published: Model) -> Model:
     """A robot whose rates, gains and dead zones differ from the published ones; without coupling."""
     keys = jax.random.split(key, 3)
-    parts = (published.dynamics.rate, published.dynamics.gain, published.dead_zone)
+    drive = require_physical(published)
+    parts = (drive.rate, drive.gain, published.dead_zone)
     rate, gain, dead_zone = (
         jnp.asarray(part) * jax.random.uniform(k, jnp.shape(part), minval=1.0 - VARIATION, maxval=1.0 + VARIATION)
         for k, part in zip(keys, parts, strict=True)

@@ -114,7 +114,9 @@ def test_step_row_by_row_equals_the_scan(missing):
         state, _ = step(state, Sample(log.u_r[k], log.u_l[k], log.x[k], log.y[k], log.theta[k]))
     assert step._cache_size() == 1
     for one, other in zip(
-        jax.tree.leaves(recursive.parameters(state.estimate)), jax.tree.leaves(recursive.parameters(estimate)), strict=True
+        jax.tree.leaves(recursive.parameters(state.estimate)),
+        jax.tree.leaves(recursive.parameters(estimate)),
+        strict=True,
     ):
         np.testing.assert_allclose(one, other, rtol=1e-9)
 

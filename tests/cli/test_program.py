@@ -1,0 +1,146 @@
+"""The installed program, as a user runs it: exit codes, one line for what is wrong, nothing half-written."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from jaxident.files.logs import read_log
+from jaxident.files.models import load_model
+
+
+def jaxident(*words, cwd=None, stdin=None):
+    return subprocess.run(
+        [sys.executable, "-m", "jaxident", *map(str, words)],
+        capture_output=True, text=True, cwd=cwd, input=stdin, check=False, timeout=300,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with a noisy log of the published robot and the paper's model of it."""
+    folder = tmp_path_factory.mktemp("program")
+    made = jaxident("simulate", "published", "--excitation", "staircase", "--samples", 600, "--hold", 5,
+                    "--noise", "1e-6,1e-5", "--out", folder / "log.csv")  # fmt: skip
+    assert made.returncode == 0, made.stderr
+    found = jaxident("identify", folder / "log.csv", "--reading", "one-step", "--out", folder / "model.json",
+                     "--json", folder / "result.json")  # fmt: skip
+    assert found.returncode == 0, found.stderr
+    assert "dead_zone_r" in found.stdout
+    assert "wrote" in found.stdout
+    return folder
+
+
+def refused(result, *words):
+    """Exit code 2 and one line on stderr that holds the words."""
+    assert result.returncode == 2, result
+    assert result.stdout == ""
+    assert len(result.stderr.splitlines()) == 1, result.stderr
+    for word in words:
+        assert word in result.stderr
+
+
+def test_help_names_every_command():
+    result = jaxident("--help")
+    assert result.returncode == 0
+    for name in ("reproduce", "example", "simulate", "convert", "identify", "predict"):
+        assert name in result.stdout
+        assert "Example:" in jaxident(name, "--help").stdout
+
+
+def test_identify_writes_a_model_that_is_right(folder):
+    model = load_model(folder / "model.json")
+    assert model.physical is None
+    assert model.provenance.logs == (str(folder / "log.csv"),)
+    np.testing.assert_allclose(model.alpha, [0.9821, 0.7706], atol=5e-3)
+    np.testing.assert_allclose(model.dead_zone, [0.25, 0.2], atol=0.02)
+    result = json.loads((folder / "result.json").read_text())
+    assert len(result["parameters"]) == 12
+
+
+def test_predict_writes_the_columns_of_the_contract(folder):
+    result = jaxident("predict", folder / "model.json", folder / "log.csv", "--horizon", 30, "--out", folder / "p.csv")
+    assert result.returncode == 0, result.stderr
+    lines = (folder / "p.csv").read_text().splitlines()
+    assert lines[0] == "run,start,step,t,x,y,theta,sd_x,sd_y,sd_theta"
+    rows = np.array([list(map(float, line.split(","))) for line in lines[1:]])
+    assert set(rows[:30, 1]) == {20.0}
+    np.testing.assert_array_equal(rows[:30, 2], np.arange(1, 31))
+    truth = read_log(folder / "log.csv")
+    ends = rows[rows[:, 2] == 30]
+    index = (ends[:, 1] + 30).astype(int)
+    assert np.median(np.hypot(ends[:, 4] - truth.x[index], ends[:, 5] - truth.y[index])) < 5e-3
+
+
+def test_same_seed_same_log(folder):
+    for name in ("a.csv", "b.csv"):
+        words = ("simulate", "published", "--excitation", "prbs", "--samples", 50, "--noise", "1e-3,1e-2", "--seed", 3)
+        assert jaxident(*words, "--out", folder / name).returncode == 0
+    assert (folder / "a.csv").read_bytes() == (folder / "b.csv").read_bytes()
+
+
+def test_wrong_use(folder):
+    log = folder / "log.csv"
+    refused(jaxident("idntify", log), "No such command 'idntify'")
+    refused(jaxident("identify"), "LOG...")
+    refused(jaxident("identify", folder / "none.csv"), "none.csv")
+    refused(jaxident("identify", log, "--forgetting", 1.5), "forgetting 1.5")
+    refused(jaxident("identify", log, "--d-max", 7), "d-max 7")
+    refused(jaxident("simulate", "published", "--out", "x.csv", cwd=folder), "--inputs LOG or --excitation NAME")
+    refused(jaxident("predict", folder / "model.json", log, "--horizon", 5000, "--burn-in", 900, "--out", "x.csv",
+                     cwd=folder), "burn-in of 900 rows")  # fmt: skip
+    assert not (folder / "x.csv").exists()
+
+
+def test_model_at_another_period_is_refused(folder):
+    log = read_log(folder / "log.csv")
+    rows = zip(log.t * 2, log.u_r, log.u_l, log.x, log.y, log.theta, strict=True)
+    text = "t,u_r,u_l,x,y,theta\n" + "".join(",".join(map(repr, map(float, row))) + "\n" for row in rows)
+    (folder / "slow.csv").write_text(text)
+    words = ("predict", folder / "model.json", folder / "slow.csv", "--horizon", 5, "--out", folder / "q.csv")
+    refused(jaxident(*words), "sample_period", "0.0333333", "0.0666667")
+    assert not (folder / "q.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        ("", ["empty"]),
+        ("t,u_r,u_l,x,y\n0,1,1,0,0\n", ["theta"]),
+        ("t,u_r,u_l,x,y,theta\n0,1,1,0,0,0\n0.1,fast,1,0,0,0\n", ["line 3", "u_r", "fast"]),
+        ("t,u_r,u_l,x,y,theta\n0,1,1,0,0,0\n0.1,1,1,nan,0,0\n", ["line 3", "nan"]),
+        ("t,u_r,u_l,x,y,theta\n0,1,1,0,0,0\n0.1,1,inf,0,0,0\n", ["line 3", "inf"]),
+        ("t,u_r,u_l,x,y,theta\n0,1,1,0,0,0\n0,1,1,0,0,0\n", ["line 3"]),
+        ("t,u_r,u_l,x,y,theta\n1,1,1,0,0,0\n0,1,1,0,0,0\n", ["line 3"]),
+        ("t,u_r,u_l,x,y,theta\n0,1,1,0,0,0\n", ["row"]),
+        ("t,u_r,u_l,x,y,theta\n" + "".join(f"{k},{k % 3},1,,,\n" for k in range(40)), ["poses"]),
+        ("t,u_r,u_l,x,y,theta\n" + "".join(f"{k},{k % 3},1,0,0,0\n" for k in range(40)), ["nothing moves"]),
+        ("t,u_r,u_l,x,y,theta\n" + "".join(f"{k},1,1,{k},0,0\n" for k in range(40)), ["no excitation"]),
+        ("t,u_r,u_l,x,y,theta\n" + "".join(f"{k + (k == 9) / 3},{k % 3},1,{k},0,0\n" for k in range(40)), ["uneven"]),
+    ],
+)
+def test_bad_logs(tmp_path, body, words):
+    (tmp_path / "bad.csv").write_text(body)
+    refused(jaxident("identify", "bad.csv", "--out", "model.json", cwd=tmp_path), *words)
+    assert [path.name for path in tmp_path.iterdir()] == ["bad.csv"]
+
+
+def test_model_with_an_unknown_key(tmp_path, folder):
+    content = json.loads((folder / "model.json").read_text()) | {"colour": "red"}
+    (tmp_path / "model.json").write_text(json.dumps(content))
+    refused(jaxident("predict", tmp_path / "model.json", folder / "log.csv", "--horizon", 5, "--out", tmp_path / "p.csv"),
+            "colour")  # fmt: skip
+
+
+def test_convert(tmp_path):
+    (tmp_path / "c.csv").write_text("t,v,w\n0,0.1,0\n0.5,0.1,0.2\n")
+    (tmp_path / "p.csv").write_text("t,x,y,theta\n0.01,0,0,0\n0.49,0.05,0,0\n")
+    words = ("convert", "--commands", "c.csv", "--poses", "p.csv", "--out", "log.csv")
+    refused(jaxident(*words, cwd=tmp_path), "track")
+    result = jaxident(*words, "--track", 0.2, cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    log = read_log(tmp_path / "log.csv")
+    np.testing.assert_allclose(log.t, [0, 0.01, 0.49, 0.5])
+    np.testing.assert_allclose(log.u_r[-1], 0.12)
