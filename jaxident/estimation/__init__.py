@@ -1,0 +1,1 @@
+"""From logs to models: observations, regressors, start values, the recursion, prediction."""

@@ -13,6 +13,7 @@ from jaxident.errors import InputError, WorkError
 from jaxident.estimation import recursive
 from jaxident.estimation.checks import check_informative
 from jaxident.estimation.initialise import Setup, initialise
+from jaxident.estimation.least_squares import full_covariance
 from jaxident.estimation.observations import observe_log
 from jaxident.log import Log, even_period, join
 from jaxident.numerics import require_float64
@@ -75,10 +76,16 @@ def identify(
     estimate, setup, history, residuals, covariance = identify_recursively(
         Log(*(jnp.asarray(column) for column in log)), setup_rows, d_max, forgetting, reading
     )
+    model = _model(estimate, covariance, period, method)
+    return Identification(model, covariance, residuals, setup, history, setup.ok)
+
+
+def _model(estimate: recursive.Estimate, covariance: Array, period: float, method: str) -> Model:
+    """The estimate as a model; WorkError where it is not finite."""
     difference, dead_zone = recursive.parameters(estimate)
     if not all(np.all(np.isfinite(a)) for a in (*difference, dead_zone, covariance)):
         raise WorkError("the recursive estimate is not finite: the log does not determine the model")
-    model = Model(
+    return Model(
         period,
         difference,
         dead_zone,
@@ -87,7 +94,6 @@ def identify(
         parameter_order=DIFFERENCE_ORDER,
         provenance=Provenance(method=method),
     )
-    return Identification(model, covariance, residuals, setup, history, setup.ok)
 
 
 def check_settings(forgetting: float, d_max: float, largest: float) -> None:
@@ -159,7 +165,7 @@ def _covariance(estimate: recursive.Estimate, variance: Increment) -> Array:
     total = 0.0
     for slope, equation, v in zip(slopes, (estimate.length, estimate.turn), variance, strict=True):
         columns = jnp.stack(slope, axis=-1)
-        total = total + v * columns @ recursive.full_covariance(equation) @ columns.T
+        total = total + v * columns @ full_covariance(equation) @ columns.T
     return total
 
 

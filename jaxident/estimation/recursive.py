@@ -4,11 +4,6 @@
     state, info = step(state, Sample(u_r, u_l, x, y, theta))
 
 `step` is pure and jittable: the same function runs inside `run`, under `vmap`, and once per camera frame on a robot.
-
-Forgetting is directional (Kulhavy 1987): only the direction that a row informs is discounted. Exponential forgetting
-divides the whole covariance by the factor at every sample, so that it grows without bound while the robot stands
-still or repeats one command (wind-up) and the next movement throws the estimate away. Here a row without information
-changes nothing, and with a factor of 1 both are ordinary least squares.
 """
 
 from typing import Any, NamedTuple
@@ -18,26 +13,16 @@ import jax.numpy as jnp
 
 from jaxident.array_types import Array, Increment, Pose, Wheels
 from jaxident.estimation.initialise import initialise
+from jaxident.estimation.least_squares import LOWER, Equation, equation_from, update
 from jaxident.estimation.observations import Observations, observe_log
-from jaxident.estimation.regressors import UNKNOWNS, Memory, Vector, dot, empty_memory, next_row
+from jaxident.estimation.regressors import Memory, Vector, empty_memory, next_row
 from jaxident.log import Log
 from jaxident.numerics import require_float64, safe_divide
 from jaxident.robot.difference import Difference
 from jaxident.robot.path_length import increment_between
 
-LOWER = tuple((i, j) for i in range(UNKNOWNS) for j in range(i + 1))
-"""Row and column of each stored entry of a covariance: the lower triangle alone, hence symmetric whatever rounding
-does."""
-
 CLEAR_OF_ZERO = 0.1
 """A numerator coefficient below this part of its start value is too small to divide by."""
-
-
-class Equation(NamedTuple):
-    """One equation's unknowns (7 scalars) and their covariance over the noise variance (28 scalars, see LOWER)."""
-
-    unknowns: Vector
-    covariance: tuple[Any, ...]
 
 
 class Estimate(NamedTuple):
@@ -81,25 +66,6 @@ class Info(NamedTuple):
     error: Increment
     scale: Increment
     used: Any
-
-
-def update(equation: Equation, row: Vector, target: Array, forgetting: Array) -> tuple[Equation, Array, Array]:
-    """One least-squares update; returns the equation, the prediction error and 1 + row' P row.
-
-    With s = row' P row: unknowns += P row e / (1 + s), P -= c (P row)(P row)' with
-    c = (f - (1 - f) / s) / (f (1 + s)) for directional forgetting f, which is 1 / (1 + s) for f = 1.
-    """
-    entry = dict(zip(LOWER, equation.covariance, strict=True))
-    size = range(UNKNOWNS)
-    direction = tuple(dot(tuple(entry[max(i, j), min(i, j)] for j in size), row) for i in size)
-    spread = jnp.maximum(dot(row, direction), 0.0)
-    error = target - dot(row, equation.unknowns)
-    gain = 1.0 / (1.0 + spread)
-    discount = safe_divide(1.0 - forgetting, spread, 0.0)
-    shrink = gain * jnp.where(spread > 0.0, (forgetting - discount) / forgetting, 0.0)
-    unknowns = tuple(old + d * (gain * error) for old, d in zip(equation.unknowns, direction, strict=True))
-    covariance = tuple(entry[i, j] - shrink * direction[i] * direction[j] for i, j in LOWER)
-    return Equation(unknowns, covariance), error, 1.0 + spread
 
 
 def absorb(estimate: Estimate, sample: Observations) -> tuple[Estimate, Info]:
@@ -156,7 +122,7 @@ def start(difference: Difference, dead_zone: Array, setup: Observations, d_max: 
     memory, information = _information(unknowns, width, first, tail(setup, 1) if complete else setup)
     slopes = CLEAR_OF_ZERO * jnp.abs(jnp.asarray(difference.delta))
     smallest = Wheels(*slopes[0]), Wheels(*slopes[1])
-    length, turn = (Equation(u, _inverse(i)) for u, i in zip(unknowns, information, strict=True))
+    length, turn = (equation_from(*pair) for pair in zip(unknowns, information, strict=True))
     return Estimate(length, turn, width, memory, smallest, jnp.asarray(forgetting) * 1.0, jnp.asarray(d_max) * 1.0)
 
 
@@ -228,24 +194,6 @@ def _information(unknowns, width: Wheels, memory: Memory, setup: Observations):
     zero = 0.0 * setup.increment.length[0]
     memory = jax.tree.map(lambda m: m | (zero != 0.0) if isinstance(m, bool) else m + zero, memory)
     return jax.lax.scan(body, (memory, ((zero,) * len(LOWER),) * 2), setup)[0]
-
-
-def _inverse(information: Vector) -> tuple[Any, ...]:
-    """Covariance from information, both as lower triangles; what the setup did not inform gets a wide, finite one."""
-    rows, columns = (list(index) for index in zip(*LOWER, strict=True))
-    matrix = jnp.zeros((UNKNOWNS, UNKNOWNS)).at[jnp.array(rows), jnp.array(columns)].set(jnp.stack(information))
-    diagonal = jnp.diagonal(matrix)
-    scale = jnp.sqrt(jnp.maximum(diagonal, 1e-12 * jnp.max(diagonal) + jnp.finfo(float).tiny))
-    matrix = (matrix + matrix.T - jnp.diag(diagonal)) / (scale[:, None] * scale)
-    inverse = jnp.linalg.inv(matrix + 1e-10 * jnp.eye(UNKNOWNS)) / (scale[:, None] * scale)
-    return tuple(inverse[i, j] for i, j in LOWER)
-
-
-def full_covariance(equation: Equation) -> Array:
-    """Covariance (7, 7) of one equation's unknowns over its noise variance."""
-    entry = dict(zip(LOWER, equation.covariance, strict=True))
-    size = range(UNKNOWNS)
-    return jnp.stack([jnp.stack([entry[max(i, j), min(i, j)] for j in size]) for i in size])
 
 
 def run_to_end(estimate: Estimate, observations: Observations) -> Estimate:

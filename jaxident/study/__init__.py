@@ -1,0 +1,1 @@
+"""Many trials: the paper's experiment and synthetic logs."""

@@ -130,8 +130,8 @@ def test_bad_logs(tmp_path, body, words):
 def test_model_with_an_unknown_key(tmp_path, folder):
     content = json.loads((folder / "model.json").read_text()) | {"colour": "red"}
     (tmp_path / "model.json").write_text(json.dumps(content))
-    refused(jaxident("predict", tmp_path / "model.json", folder / "log.csv", "--horizon", 5, "--out", tmp_path / "p.csv"),
-            "colour")  # fmt: skip
+    words = ("predict", tmp_path / "model.json", folder / "log.csv", "--horizon", 5, "--out", tmp_path / "p.csv")
+    refused(jaxident(*words), "colour")
 
 
 def test_convert(tmp_path):

@@ -7,8 +7,9 @@ import pytest
 
 from jaxident.array_types import Increment, Wheels
 from jaxident.estimation import recursive
+from jaxident.estimation.least_squares import LOWER, Equation, full_covariance, update
 from jaxident.estimation.observations import observe_log
-from jaxident.estimation.recursive import LOWER, Equation, Sample
+from jaxident.estimation.recursive import Sample
 from jaxident.estimation.regressors import Memory, dot, empty_memory, key_terms, next_row
 from jaxident.log import Log, make_log
 from jaxident.robot.difference import Difference
@@ -59,17 +60,15 @@ def test_forgetting_one_and_known_dead_zones_equal_batch_least_squares():
     cut = 100
     covariance = np.linalg.inv(matrix[:cut].T @ matrix[:cut])
     unknowns = covariance @ matrix[:cut].T @ target[:cut]
-    equation = Equation(tuple(unknowns), tuple(covariance[i, j] for i, j in LOWER))
+    equation = Equation(tuple(unknowns), tuple(covariance[i, j] for i, j in LOWER), (np.inf,) * 7)
 
     def body(equation, sample):
-        return recursive.update(equation, tuple(sample[0]), sample[1], 1.0)[0], None
+        return update(equation, tuple(sample[0]), sample[1], 1.0)[0], None
 
     equation, _ = jax.lax.scan(body, jax.tree.map(jnp.asarray, equation), (matrix[cut:], target[cut:]))
     batch = np.linalg.lstsq(matrix, target, rcond=None)[0]
     np.testing.assert_allclose(np.stack(equation.unknowns), batch, rtol=1e-8, atol=1e-8 * np.abs(batch).max())
-    np.testing.assert_allclose(
-        recursive.full_covariance(equation), np.linalg.inv(matrix.T @ matrix), rtol=1e-6, atol=1e-8
-    )
+    np.testing.assert_allclose(full_covariance(equation), np.linalg.inv(matrix.T @ matrix), rtol=1e-6, atol=1e-8)
 
 
 def test_rows_hold_at_the_truth_where_poses_are_missing():
@@ -84,9 +83,10 @@ def test_rows_hold_at_the_truth_where_poses_are_missing():
 
     memory = jax.tree.map(jnp.asarray, empty_memory())
     _, (usable, turn, size, length) = jax.lax.scan(body, memory, observe_log(log))
+    usable = np.asarray(usable) & (np.cumsum(usable) > 1)  # the first row leans on the mean increment of a gap
     assert np.count_nonzero(usable) > 150
     np.testing.assert_allclose(np.asarray(turn)[usable], 0.0, atol=1e-12)
-    small = np.asarray(usable) & (np.abs(size) < 0.3)
+    small = usable & (np.abs(size) < 0.3)
     assert np.median(np.abs(np.asarray(length)[small])) < 1e-7
 
 
@@ -121,14 +121,10 @@ def test_step_row_by_row_equals_the_scan(missing):
         np.testing.assert_allclose(one, other, rtol=1e-9)
 
 
-def test_noise_free_data_are_recovered_from_a_wrong_start():
+def test_forgetting_recovers_noise_free_data_from_a_wrong_start():
+    """Without forgetting the rows switched by a wrong dead zone count for ever."""
     start = Difference(ROBOT.alpha * 0.999, ROBOT.delta * 1.01, ROBOT.epsilon * 0.99)
-    log = record(samples=2000)
-    estimate, observations = started(log, 60, start)
-    wide = jax.tree.map(lambda c: c * 1e6, (estimate.length.covariance, estimate.turn.covariance))
-    estimate = estimate._replace(
-        length=estimate.length._replace(covariance=wide[0]), turn=estimate.turn._replace(covariance=wide[1])
-    )
+    estimate, observations = started(record(samples=2000), 200, start, forgetting=0.97)
     found, dead_zone = recursive.parameters(jax.jit(recursive.run_to_end)(estimate, observations))
     for one, true in zip((*found, dead_zone), (*ROBOT, DEAD_ZONE), strict=True):
         np.testing.assert_allclose(one, true, rtol=1e-3)
@@ -138,11 +134,10 @@ def test_covariance_stays_bounded_and_positive_when_excitation_stops():
     log = record(samples=300, noise=1e-5)
     estimate, _ = started(log, 200, forgetting=0.95)
     still = observe_log(make_log(*(jnp.zeros(20001) for _ in range(6))))
-    size = lambda e: np.abs(np.asarray(recursive.full_covariance(e))).max()  # noqa: E731
     after = jax.jit(recursive.run_to_end)(estimate, still)
-    for equation, before in ((after.length, estimate.length), (after.turn, estimate.turn)):
-        covariance = np.asarray(recursive.full_covariance(equation))
-        assert size(equation) <= 1.001 * size(before)
+    for equation in (after.length, after.turn):
+        covariance = np.asarray(full_covariance(equation))
+        assert np.all(np.diagonal(covariance) <= np.stack(equation.widest))
         scale = np.sqrt(np.diagonal(covariance))
         assert np.linalg.eigvalsh(covariance / np.outer(scale, scale)).min() > 0.0
 
