@@ -2,9 +2,8 @@
 
     J = sum over the measured samples of ((dl - dl_hat) / s_l)^2 + ((dtheta - dtheta_hat) / s_theta)^2
 
-in one of two readings of dl_hat and dtheta_hat: `one_step` puts the measured last increment on the right of
-(13)-(14), `free_run` the model's own. The search runs over the dead zones (and, in free run, the poles) alone;
-`projection` solves for everything else.
+in one of the two readings of dl_hat and dtheta_hat of `readings`. The search runs over the dead zones and the poles
+alone; `projection` solves for everything else.
 """
 
 from collections.abc import Callable
@@ -16,36 +15,35 @@ import lineax
 import optimistix
 
 from jaxident.array_types import Array, Increment
-from jaxident.errors import InputError
 from jaxident.estimation.observations import Observations
-from jaxident.estimation.projection import Projected, free_run_reading, grid_squares, one_step_reading, project
+from jaxident.estimation.projection import Projected, linear_residual, profile, project
+from jaxident.estimation.readings import Reading, one_step, reading_of, usable
 from jaxident.robot.difference import Difference
 
-GRID = 10
-"""Dead zones per wheel on the grid that the search starts from."""
+WINDOW, WINDOWS, FINER = 15, 9, 3.0
+"""The search looks through windows of WINDOW^2 dead zones, the first over all of them, each FINER times as fine as
+the one before: the last tells dead zones 1e-5 of the largest apart."""
 
-POLES = (0.2, 0.6, 0.8, 0.9, 0.96, 0.985, 0.996)
-"""Poles per channel on that grid, in free run."""
+POLES = (0.0, 0.4, 0.65, 0.8, 0.88, 0.94, 0.97, 0.985, 0.9925, 0.998)
+"""Poles that a free run starts from: the time constant grows by a half or more from one to the next."""
 
-STARTS = 2
-MAX_STEPS = 12
+POLE_LIMIT = 0.9995
+"""Largest pole that a window, which is right to first order alone, may suggest in free run."""
+
+MAX_STEPS = 6
 RTOL, ATOL = 1e-9, 1e-10
 
-WINDOW = 5
-ZOOMS = 12
-"""The last search: windows of WINDOW^2 dead zones, each half as wide as the one before."""
+UNKNOWNS = 12
 
 SMALLEST_WEIGHT = 1e-9
 """Residual [m], [rad] that noise-free data are weighted by."""
-
-READINGS = ("free_run", "one_step")
 
 
 class Setup(NamedTuple):
     """Parameters of (13)-(14) and dead zones (2,) from the setup time.
 
-    cost is J; weight s, the residual [m], [rad] of the linear fit in each channel; ok: finite, and no lower than what
-    the search began with; steps: how many it took from its best start.
+    cost is J; weight s, the residual [m], [rad] of the linear fit in each channel; ok: finite, from more
+    samples than unknowns; steps: how many it took from its best start.
     """
 
     difference: Difference
@@ -57,117 +55,114 @@ class Setup(NamedTuple):
 
 
 class Cost(NamedTuple):
-    """J as functions: what is left at a point (2,) or (4,); J on a grid of right and left dead zones, at one pole per
-    channel, by channel (2, n, m); and the weights s (2,)."""
+    """J as functions of a point (4,), dead zones and poles: what is left at a point; J and the best points (n, m, 4)
+    for all pairs of n right and m left dead zones, seen from a point. weight: s (2,)."""
 
     left: Callable[[Array], Projected]
-    grid: Callable[[Array, Array, Array], Array]
+    around: Callable[[Array, Array, Array], tuple[Array, Array]]
     weight: Array
 
-    def at(self, point: Array) -> Array:
-        """J at one point."""
-        return jnp.sum((self.left(point).residual / self.weight[:, None]) ** 2)
+    def best(self, points: Array) -> tuple[Array, Array, Array]:
+        """The lowest of some points (n, 4), J and the numerators there."""
+        left = jax.vmap(self.left)(points)
+        costs = jnp.sum((left.residual / self.weight[:, None]) ** 2, axis=(1, 2))
+        best = jnp.argmin(jnp.where(jnp.isfinite(costs), costs, jnp.inf))
+        return points[best], costs[best], left.numerator[best]
 
 
 def initialise(observations: Observations, *, d_max: Array, reading: str = "free_run") -> Setup:
     """Minimise J over all twelve parameters, 0 <= D <= d_max, |alpha| < 1 in free run.
 
-    J has kinks where a dead zone crosses a level of the commands, and local minima between them: the search starts
-    from the best points of a coarse grid, follows optimistix's Levenberg-Marquardt from each, and ends with ever
-    smaller grids around the lowest. Pure: runs under jit and vmap. Double precision.
+    J has kinks where a dead zone crosses a level of the commands, and local minima between them. A gradient sees
+    neither: windows of dead zones, each finer than the last, find the lowest valley, and optimistix's
+    Levenberg-Marquardt its floor. Pure: runs under jit and vmap. Double precision.
     """
-    cost = _cost(observations, reading)
-    points, costs = (_one_step_starts if reading == "one_step" else _free_run_starts)(cost, d_max)
-    starts = points[jax.lax.top_k(-costs, STARTS)[1]]
-    ends, costs, steps = jax.lax.map(lambda start: _refine(cost, d_max, start), starts)
-    best = jnp.argmin(jnp.where(jnp.isfinite(costs), costs, jnp.inf))
-    point = _settle(cost, d_max, ends[best])
-    left, lowest = cost.left(point), cost.at(point)
+    read = reading_of(observations, reading)
+    weight, count = _linear_weight(observations)
+    cost = _cost(observations, read, weight)
+    if reading == "one_step":
+        start = _windows(cost, jnp.zeros(2), d_max, WINDOWS)
+    else:
+        coarse = _windows(_cost(observations, one_step(observations), weight), jnp.zeros(2), d_max, 1)
+        start = _windows(cost, _best_poles(cost, coarse), d_max, WINDOWS)
+    refined, steps = _refine(cost, read, d_max, start)
+    point, lowest, numerator = cost.best(jnp.stack([start, refined]))
     return Setup(
-        difference=Difference(left.alpha, left.numerator[:, :2], -left.numerator[:, 2:]),
+        difference=Difference(point[2:], numerator[:, :2], -numerator[:, 2:]),
         dead_zone=point[:2],
         cost=lowest,
-        weight=Increment(cost.weight[0], cost.weight[1]),
-        ok=jnp.isfinite(lowest) & (lowest <= cost.at(starts[0])) & jnp.all(jnp.isfinite(left.numerator)),
-        steps=steps[best],
+        weight=Increment(weight[0], weight[1]),
+        ok=jnp.isfinite(lowest) & jnp.all(jnp.isfinite(numerator)) & (count > UNKNOWNS),
+        steps=steps,
     )
 
 
-def _cost(observations: Observations, reading: str) -> Cost:
-    """J in one reading, each channel weighted by its residual after a linear fit without dead zones, (19)-(20)."""
-    if reading not in READINGS:
-        raise InputError(f"reading {reading!r}: one of {', '.join(READINGS)}")
-    one_step, use = one_step_reading(observations)
-    linear = project(one_step, observations, jnp.zeros(2)).residual
-    weight = jnp.maximum(jnp.sqrt(jnp.sum(linear**2, axis=1) / jnp.maximum(jnp.sum(use), 1)), SMALLEST_WEIGHT)
-    read = one_step if reading == "one_step" else free_run_reading(observations)
-    return Cost(
-        left=lambda point: project(read, observations, point),
-        grid=lambda *where: grid_squares(read, observations, *where) / weight[:, None, None] ** 2,
-        weight=weight,
-    )
+def _linear_weight(observations: Observations) -> tuple[Array, Array]:
+    """Root-mean-square residual (2,) of (19)-(20), the one-step fit without dead zones, and of how many samples."""
+    read = one_step(observations)
+    count = jnp.sum(usable(observations))
+    residual = jax.vmap(lambda y: linear_residual(read, observations, y))(jnp.stack(observations.increment))
+    mean = jnp.sum(residual**2, axis=1) / jnp.maximum(count, 1)
+    return jnp.maximum(jnp.sqrt(mean), SMALLEST_WEIGHT), count
 
 
-def _one_step_starts(cost: Cost, d_max: Array) -> tuple[Array, Array]:
-    """Points (GRID^2, 2) and J there."""
-    widths = d_max * (jnp.arange(GRID) + 0.5) / GRID
-    return _pairs(widths), jnp.sum(cost.grid(widths, widths, jnp.zeros(2)), axis=0).ravel()
+def _cost(observations: Observations, reading: Reading, weight: Array) -> Cost:
+    limit = jnp.abs(reading.pole(jnp.asarray(jnp.inf))) * POLE_LIMIT
+
+    def around(point: Array, rights: Array, lefts: Array) -> tuple[Array, Array]:
+        squares, poles = profile(reading, observations, point, rights, lefts)
+        costs = jnp.sum(squares / weight[:, None, None] ** 2, axis=0)
+        pairs = jnp.meshgrid(rights, lefts, indexing="ij")
+        return costs, jnp.stack([*pairs, *jnp.clip(poles, -limit, limit)], axis=-1)
+
+    return Cost(lambda point: project(reading, observations, point), around, weight)
 
 
-def _free_run_starts(cost: Cost, d_max: Array) -> tuple[Array, Array]:
-    """Points (GRID^2, 4) and J there. Each channel takes its best pole on its own: given the dead zones the two
-    share nothing."""
-    widths = d_max * (jnp.arange(GRID) + 0.5) / GRID
+def _best_poles(cost: Cost, point: Array) -> Array:
+    """For each channel the best (2,) of POLES: given the dead zones, the channels share nothing."""
     poles = jnp.asarray(POLES)
-    by_channel = jax.lax.map(lambda pole: cost.grid(widths, widths, jnp.stack([pole, pole])), poles)
-    best = poles[jnp.argmin(by_channel, axis=0)].reshape(2, -1)
-    points = jnp.concatenate([_pairs(widths), best.T], axis=1)
-    return points, jnp.sum(jnp.min(by_channel, axis=0), axis=0).ravel()
+    left = jax.vmap(lambda pole: cost.left(point.at[2:].set(pole)).residual)(poles)
+    return poles[jnp.argmin(jnp.sum(left**2, axis=2), axis=0)]
 
 
-def _refine(cost: Cost, d_max: Array, start: Array) -> tuple[Array, Array, Array]:
-    """Levenberg-Marquardt from one point, in coordinates that cannot leave the bounds: the end, J there, the steps."""
+def _windows(cost: Cost, poles: Array, d_max: Array, count: int) -> Array:
+    """The lowest point (4,) that the first windows find."""
+    sides = jnp.linspace(-1.0, 1.0, WINDOW)
 
-    def residual(coordinates, _):
-        return (cost.left(_inside(coordinates, d_max)).residual / cost.weight[:, None]).ravel()
+    def look(k, centre):
+        return _lowest(cost, centre, 0.5 * d_max * FINER**-k * sides, d_max)
+
+    return jax.lax.fori_loop(0, count, look, jnp.concatenate([jnp.full(2, 0.5 * d_max), poles]))
+
+
+def _lowest(cost: Cost, centre: Array, offsets: Array, d_max: Array) -> Array:
+    """The best point for dead zones at any two of some offsets from a centre."""
+    costs, points = cost.around(centre, *(jnp.clip(d + offsets, 0.0, d_max) for d in centre[:2]))
+    return points.reshape(-1, 4)[jnp.argmin(costs)]
+
+
+def _refine(cost: Cost, reading: Reading, d_max: Array, start: Array) -> tuple[Array, Array]:
+    """Levenberg-Marquardt from one point, in coordinates that cannot leave the bounds: the end, and the steps."""
+
+    @jax.custom_jvp
+    def residual(point):
+        return cost.left(point).residual / cost.weight[:, None]
+
+    @residual.defjvp
+    def _(primals, tangents):
+        left = cost.left(*primals)
+        width, pole = tangents[0][:2], tangents[0][2:, None]
+        slope = jnp.einsum("cds,d->cs", left.slope[:, :2], width) + pole * left.slope[:, 2]
+        return left.residual / cost.weight[:, None], slope / cost.weight[:, None]
+
+    def inside(coordinates):
+        return jnp.concatenate([d_max * jnp.sin(coordinates[:2]) ** 2, reading.pole(coordinates[2:])])
 
     search: optimistix.Solution = optimistix.least_squares(
-        residual,
+        lambda coordinates, _: residual(inside(coordinates)),
         optimistix.LevenbergMarquardt(RTOL, ATOL, linear_solver=lineax.Normal(lineax.Cholesky())),
-        _coordinates(start, d_max),
+        jnp.concatenate([jnp.arcsin(jnp.sqrt(start[:2] / d_max)), reading.coordinate(start[2:])]),
         max_steps=MAX_STEPS,
         throw=False,
     )
-    point = _inside(search.value, d_max)
-    return point, cost.at(point), search.stats["num_steps"]
-
-
-def _settle(cost: Cost, d_max: Array, point: Array) -> Array:
-    """The lowest point nearby on ever smaller grids of dead zones.
-
-    On a kink the gradient says nothing of the other side, and Levenberg-Marquardt stops short of the lowest point.
-    """
-    poles = point[2:] if len(point) > 2 else jnp.zeros(2)
-    sides = jnp.linspace(-1.0, 1.0, WINDOW)
-
-    def zoom(k, centre):
-        reach = 0.5 * d_max / GRID * 0.5**k
-        rights, lefts = (jnp.clip(c + reach * sides, 0.0, d_max) for c in centre)
-        lowest = jnp.argmin(jnp.sum(cost.grid(rights, lefts, poles), axis=0))
-        return jnp.stack([rights[lowest // WINDOW], lefts[lowest % WINDOW]])
-
-    settled = point.at[:2].set(jax.lax.fori_loop(0, ZOOMS, zoom, point[:2]))
-    return jnp.where(cost.at(settled) < cost.at(point), settled, point)
-
-
-def _pairs(widths: Array) -> Array:
-    return jnp.stack(jnp.meshgrid(widths, widths, indexing="ij"), axis=-1).reshape(-1, 2)
-
-
-def _inside(coordinates: Array, d_max: Array) -> Array:
-    """Dead zones d_max sin^2 and poles tanh: smooth, and both bounds of a dead zone can be reached."""
-    return jnp.concatenate([d_max * jnp.sin(coordinates[:2]) ** 2, jnp.tanh(coordinates[2:])])
-
-
-def _coordinates(point: Array, d_max: Array) -> Array:
-    return jnp.concatenate([jnp.arcsin(jnp.sqrt(point[:2] / d_max)), jnp.arctanh(point[2:])])
+    return inside(search.value), search.stats["num_steps"]

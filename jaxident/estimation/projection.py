@@ -1,11 +1,10 @@
-"""The linear part of (13)-(14) in closed form, given the dead zones, and in free run the poles.
+"""What is linear in (13)-(14) solved for in closed form, given the dead zones and the poles.
 
-Variable projection (Golub and Pereyra 1973): what is left of the measured increments when the best numerators, and
-with them whatever else is linear, have explained their share. The two readings of (21) differ only in what they make
-of an input signal before it becomes a column of the regression.
+Variable projection (Golub and Pereyra 1973): what the best numerators leave of the measured increments, and how that
+answers the dead zones and poles, in Kaufman's form (1975), which misses only what vanishes with the residual itself.
+A point is (4,): the dead zones D_r and D_l, then the poles of both channels.
 """
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
@@ -13,152 +12,119 @@ import jax.numpy as jnp
 
 from jaxident.array_types import Array
 from jaxident.estimation.observations import Observations
-from jaxident.numerics import solve_positive
+from jaxident.estimation.readings import Reading
+from jaxident.numerics import safe_divide
 from jaxident.robot.dead_zone import dead_zone
 
 RIDGE = 1e-13
-"""Added to the diagonal of scaled normal equations: an input that never leaves its dead zone gets the coefficient 0."""
-
-Reading = Callable[[Array, Array, Array], tuple[Array, Array]]
-"""From a pole, input signals (n, samples) and a channel's increments (samples,) to columns, the inputs' first, and
-target, both 0 where nothing is measured."""
+"""Smallest pivot, relative to the diagonal: an input that never leaves its dead zone gets the coefficient 0."""
 
 
 class Projected(NamedTuple):
-    """residual (2, samples) of both channels [m], [rad]; alpha (2,); numerator (2, 4), the coefficients of m_r and
-    m_l at k-1, then at k-2."""
+    """residual (2, samples) of both channels [m], [rad]; numerator (2, 4), the coefficients of m_r and m_l at k-1,
+    then at k-2; slope (2, 3, samples), of the residual by either dead zone and the channel's own pole."""
 
     residual: Any
-    alpha: Any
     numerator: Any
-
-
-def one_step_reading(observations: Observations) -> tuple[Reading, Array]:
-    """(21) with the measured last increment on the right, and which samples count: those whose increment and the one
-    before each span a single sample, that is three poses in a row. The pole is the last column's coefficient."""
-    single = observations.measured & (observations.first | _earlier(observations.seen))
-    use = single & ~observations.first & _earlier(single)
-
-    def read(_, signals: Array, increments: Array) -> tuple[Array, Array]:
-        columns = jnp.vstack([signals, _earlier(increments)])
-        return jnp.where(use, columns, 0.0), jnp.where(use, increments, 0.0)
-
-    return read, use
-
-
-def free_run_reading(observations: Observations) -> Reading:
-    """(21) with the model's own last increment on the right.
-
-    The increment at the first sample of each run is one more linear unknown, taken out of columns and target. Where
-    poses are missing, the sum of increments since the last one is compared with the measured one that spans them.
-    """
-    run = jnp.cumsum(observations.first | ~observations.inside) - 1
-    restart = observations.first | _earlier(observations.seen) | ~observations.inside
-
-    def read(alpha: Array, signals: Array, increments: Array) -> tuple[Array, Array]:
-        response, start = _respond(alpha, signals, observations.first, restart)
-        start = jnp.where(observations.measured, start, 0.0)
-        energy = jax.ops.segment_sum(start * start, run, len(start))
-        signals = jnp.where(observations.measured, jnp.vstack([response, increments]), 0.0)
-        share = (
-            jax.ops.segment_sum((signals * start).T, run, len(start)) / jnp.where(energy > 0.0, energy, 1.0)[:, None]
-        )
-        signals = signals - start * share[run].T
-        return signals[:-1], signals[-1]
-
-    return read
+    slope: Any
 
 
 def project(reading: Reading, observations: Observations, point: Array) -> Projected:
-    """What is left at a point: the dead zones (2,), followed in free run by the poles."""
-    signals = _passed(observations, point[:1], point[1:2])
-    poles = point[2:] if len(point) > 2 else jnp.zeros(2)
-    fits = [
-        _least_squares(*reading(pole, signals, increments))
-        for pole, increments in zip(poles, observations.increment, strict=True)
-    ]
-    residual, unknowns = (jnp.stack(part) for part in zip(*fits, strict=True))
-    return Projected(residual, point[2:] if len(point) > 2 else unknowns[:, 4], unknowns[:, :4])
+    """What is left at a point (4,), and how it changes around it."""
+    commands = jnp.stack([*observations.command, *observations.command_before])
+    widths = jnp.tile(point[:2], 2)[:, None]
+    passed = dead_zone(commands, widths)
+    switch = jnp.where(jnp.abs(commands) > widths, -jnp.sign(commands), 0.0)
+
+    def channel(pole: Array, increments: Array) -> Projected:
+        regression = reading.regress(pole, jnp.vstack([passed, switch]), increments)
+        inputs, switches = regression.columns[:4], regression.columns[4:]
+        weights, rest = _fit(inputs, regression.target[None])
+        first = weights[0]
+        by_width = (first[:, None] * switches).reshape(2, 2, -1).sum(axis=0)
+        weights, left = _fit(inputs, jnp.vstack([by_width, regression.slope(first), rest]))
+        return Projected(left[3], first + weights[3], -left[:3])
+
+    return jax.vmap(channel)(point[2:], jnp.stack(observations.increment))
 
 
-def grid_squares(reading: Reading, observations: Observations, rights: Array, lefts: Array, poles: Array) -> Array:
-    """Sums of squared residuals (2, n, m) for all pairs of n right and m left dead zones, at one pole per channel.
+def linear_residual(reading: Reading, observations: Observations, increments: Array) -> Array:
+    """What a fit of one channel without dead zones leaves, (samples,), the pole among its coefficients."""
+    commands = jnp.stack([*observations.command, *observations.command_before])
+    regression = reading.regress(jnp.zeros(()), commands, increments)
+    columns = jnp.vstack([regression.columns, regression.slope(jnp.zeros(0))])
+    return _fit(columns, regression.target[None])[1][0]
 
-    One matrix of inner products holds those of every pair, which makes a grid point some hundred times cheaper than
-    `project`; cancellation leaves an error of about 1e-13 of the target's own sum of squares.
+
+def _fit(columns: Array, targets: Array) -> tuple[Array, Array]:
+    """Weights (t, n) of columns (n, samples) in targets (t, samples), and what they leave of these."""
+    table = jnp.vstack([columns, targets])
+    weights = eliminate(table @ table.T, len(columns))[: len(columns), len(columns) :].T
+    return weights, targets - weights @ columns
+
+
+def eliminate(table: Array, count: int) -> Array:
+    """Gauss-Jordan elimination of the first `count` of n signals from their inner products (n, n, ...).
+
+    Afterwards [i, j] holds, for i < count <= j, the least-squares weight of signal i in signal j; for i, j >= count
+    the inner product of what remains of the two. Plain arithmetic runs over thousands of tables at once, where LAPACK
+    would be called for each.
+    """
+    diagonal = [table[i, i] for i in range(count)]
+    pivot_row = jnp.arange(len(table)).reshape(-1, *[1] * (table.ndim - 1))
+    for i, size in enumerate(diagonal):
+        row = table[i] * _inverse(table[i, i], size)
+        table = jnp.where(pivot_row == i, row, table - table[:, i, None] * row)
+    return table
+
+
+def profile(reading: Reading, observations: Observations, point: Array, rights: Array, lefts: Array):
+    """Sums of squared residuals and best poles, both (2, n, m), for all pairs of n right and m left dead zones.
+
+    The poles are eliminated like the numerators: exactly in one step, to first order around `point` in free run. A
+    few products of all signals serve every pair; cancellation leaves an error of about 1e-13 of the target's square.
     """
     n, m = len(rights), len(lefts)
-    signals = _passed(observations, rights, lefts)
+    commands = jnp.stack(observations.command), jnp.stack(observations.command_before)
+    centre = [dead_zone(u, point[:2, None]) for u in commands]
+    passed = [dead_zone(u[k], d[:, None]) for k, d in enumerate((rights, lefts)) for u in commands]
 
-    def channel(pole: Array, increments: Array) -> Array:
-        columns, target = reading(pole, signals, increments)
-        table = jnp.vstack([columns, target])
-        gram = table @ table.T
-        right, left = jnp.arange(n)[:, None], n + jnp.arange(m)[None, :]
-        others = range(2 * (n + m), len(table))
-        rows = [
-            jnp.broadcast_to(row, (n, m)) for row in (right, left, right + n + m, left + n + m, *map(jnp.array, others))
-        ]
-        return _remainder(jnp.stack([jnp.stack([gram[a, b] for b in rows]) for a in rows]))
+    def channel(pole: Array, increments: Array) -> tuple[Array, Array]:
+        columns, target, slope_under = reading.regress(pole, jnp.vstack([*centre, *passed]), increments)
+        slope = slope_under(_fit(columns[:4], target[None])[0][0])
+        right, left = columns[4 : 4 + 2 * n].reshape(2, n, -1), columns[4 + 2 * n :].reshape(2, m, -1)
+        (slopes, both), (_, squares) = _schur(_pairs(right, left, jnp.stack([slope, target])), 4)
+        move = safe_divide(both, slopes, 0.0)
+        return jnp.maximum(squares - move * both, 0.0), pole + move
 
-    return jnp.stack([channel(*pair) for pair in zip(poles, observations.increment, strict=True)])
-
-
-def _remainder(gram: Array) -> Array:
-    """The last column's square that the others do not explain, from inner products (columns, columns, ...)."""
-    diagonal = jnp.diagonal(gram)
-    for i in range(len(gram) - 1):
-        pivot = jnp.maximum(gram[i, i], RIDGE * diagonal[..., i])
-        inverse = jnp.where(pivot > 0.0, 1.0 / jnp.where(pivot > 0.0, pivot, 1.0), 0.0)
-        gram = gram - gram[:, i, None] * gram[i] * inverse
-    return jnp.maximum(gram[-1, -1], 0.0)
+    return jax.vmap(channel)(point[2:], jnp.stack(observations.increment))
 
 
-def _passed(observations: Observations, rights: Array, lefts: Array) -> Array:
-    """m at k-1 for each right and each left dead zone, then the same at k-2: (2 (n + m), samples)."""
-    return jnp.vstack(
-        [
-            dead_zone(command, width[:, None])
-            for commands in (observations.command, observations.command_before)
-            for command, width in zip(commands, (rights, lefts), strict=True)
-        ]
-    )
+def _schur(table: Array, count: int) -> Array:
+    """What remains of inner products (n, n, ...) once the first `count` signals have explained their share."""
+    diagonal = [table[i, i] for i in range(count)]
+    for size in diagonal:
+        row = table[0, 1:] * _inverse(table[0, 0], size)
+        table = table[1:, 1:] - table[1:, 0, None] * row
+    return table
 
 
-def _respond(alpha: Array, signals: Array, first: Array, restart: Array) -> tuple[Array, Array]:
-    """Response to signals (n, samples), and to a unit increment at the first sample of each run, both summed since
-    the last pose."""
-    drive = jnp.vstack([jnp.where(first, 0.0, signals), jnp.where(first, 1.0, 0.0)]).T
-
-    def body(carry, now):
-        last, total = carry
-        new, first, restart = now
-        last = jnp.where(first, 0.0, alpha * last) + new
-        total = jnp.where(restart, 0.0, total) + last
-        return (last, total), total
-
-    zero = 0.0 * (drive[0] + alpha)
-    _, response = jax.lax.scan(body, (zero, zero), (drive, first, restart))
-    return response[:, :-1].T, response[:, -1]
-
-
-def _least_squares(columns: Array, target: Array) -> tuple[Array, Array]:
-    """Residual (samples,) and coefficients (n,) of a target on columns (n, samples), by refined normal equations.
-
-    The coefficients count as constants in derivatives: Kaufman's form (1975) of the residual's slope, which misses
-    only what vanishes with the residual itself.
-    """
-    fixed = jax.lax.stop_gradient(columns)
-    size = jnp.sqrt(jnp.sum(fixed * fixed, axis=1))
-    scale = jnp.where(size > 0.0, size, 1.0)
-    unit = fixed / scale[:, None]
-    gram = unit @ unit.T + RIDGE * jnp.eye(len(unit))
-    first = solve_positive(gram, unit @ jax.lax.stop_gradient(target))
-    rest = target - (first / scale) @ columns
-    second = solve_positive(gram, unit @ rest)
-    return rest - second @ unit, (first + jax.lax.stop_gradient(second)) / scale
+def _pairs(right: Array, left: Array, behind: Array) -> Array:
+    """Inner products (6, 6, n, m) of right (2, n, samples), left (2, m, samples) and behind (2, samples) signals, for
+    every pair of a right and a left dead zone. Products of inputs alone are shared where their channels are."""
+    shape = 2, 2, right.shape[1], left.shape[1]
+    blocks = {
+        (0, 0): jnp.einsum("ink,jnk->ijn", right, right)[..., None],
+        (0, 1): jnp.einsum("ink,jmk->ijnm", right, left),
+        (0, 2): jnp.einsum("ink,jk->ijn", right, behind)[..., None],
+        (1, 1): jnp.einsum("imk,jmk->ijm", left, left)[:, :, None],
+        (1, 2): jnp.einsum("imk,jk->ijm", left, behind)[:, :, None],
+        (2, 2): (behind @ behind.T)[..., None, None],
+    }
+    full = [[blocks[i, j] if i <= j else blocks[j, i].swapaxes(0, 1) for j in range(3)] for i in range(3)]
+    return jnp.concatenate([jnp.concatenate([jnp.broadcast_to(b, shape) for b in row], axis=1) for row in full])
 
 
-def _earlier(signal: Array) -> Array:
-    """The sample before; 0 (False) before the first."""
-    return jnp.concatenate([jnp.zeros_like(signal[:1]), signal[:-1]])
+def _inverse(pivot: Array, size: Array) -> Array:
+    """1 / pivot, no smaller than RIDGE of the diagonal that it began as; 0 for a signal of zeros."""
+    return safe_divide(1.0, jnp.maximum(pivot, RIDGE * size), 0.0)

@@ -8,9 +8,9 @@ from jaxident import plot
 from jaxident.array_types import Increment
 from jaxident.files.atomic import write_bytes
 from jaxident.report.page import Figure, Page, Section, Table, write_page
-from jaxident.robot.model import DIFFERENCE_ORDER
+from jaxident.robot.model import DIFFERENCE_ORDER, difference_vector
 from jaxident.robot.path_length import path_length
-from jaxident.study.reproduction import ESTIMATORS, TABLE_NOISE, Reproduction, count_closer
+from jaxident.study.reproduction import ESTIMATORS, TABLE_NOISE, Reproduction, Row, count_closer, table_rows
 
 SHOWN_AGAINST_NOISE = ("alpha_1", "alpha_2", "delta_21", "dead_zone_r")
 SHOWN_SAMPLES = slice(0, 300)
@@ -25,7 +25,7 @@ def write_reproduction(result: Reproduction, folder: str) -> list[str]:
         write_bytes(path, figure.png)
         paths.append(path)
     page = os.path.join(folder, "index.html")
-    write_page(_page(result, figures), page)
+    write_page(_page(result, table_rows(result), figures), page)
     return [*paths, page]
 
 
@@ -84,7 +84,7 @@ def _convergence(result: Reproduction) -> Figure:
         history.parameters,
         history.standard_deviation,
         names=DIFFERENCE_ORDER,
-        truth=[row.true for row in result.rows],
+        truth=_truth(result),
         axes=axes,
     )
     return _done(
@@ -109,17 +109,20 @@ def _path(result: Reproduction) -> Figure:
 def _against_noise(result: Reproduction, name: str) -> Figure:
     column = DIFFERENCE_ORDER.index(name)
     study = result.noise
-    estimates = {
-        estimator: np.where(study.ok[:, :, k], study.estimates[:, :, k, column], np.nan)
-        for k, estimator in enumerate(ESTIMATORS)
-    }
+    found, ok = np.asarray(study.estimates)[..., column], np.asarray(study.ok)
+    estimates = {name: np.where(ok[:, :, k], found[:, :, k], np.nan) for k, name in enumerate(ESTIMATORS)}
     figure, ax = plot.figure(size=(6.3, 3.8))
-    plot.error_against_noise(study.levels, estimates, truth=result.rows[column].true, label=name, ax=ax)
+    plot.error_against_noise(study.levels, estimates, truth=_truth(result)[column], label=name, ax=ax)
     return _done(
         figure,
         f"Error of {name} against camera noise",
-        f"Error of {name} against camera noise (10 mrad for each millimetre), {study.estimates.shape[1]} seeds.",
+        f"Error of {name} against camera noise (10 mrad for each millimetre), {ok.shape[1]} seeds; "
+        f"{np.count_nonzero(~ok)} of {ok.size} runs failed.",
     )
+
+
+def _truth(result: Reproduction) -> np.ndarray:
+    return np.asarray(difference_vector(result.reference.difference, result.reference.dead_zone))
 
 
 def _drift(drift) -> Figure:
@@ -134,18 +137,17 @@ def _done(figure, alt: str, caption: str) -> Figure:
     return Figure(plot.image(figure), alt, caption)
 
 
-def _page(result: Reproduction, figures: dict[str, Figure]) -> Page:
+def _page(result: Reproduction, rows: list[Row], figures: dict[str, Figure]) -> Page:
     """The page: table first, then the paper's figures, then what noise and age do."""
-    closer = count_closer(result.rows)
+    closer = count_closer(rows)
     lead = (
-        f"Without noise, {closer} of {len(result.rows)} numbers lie closer to the truth than the paper's printed "
+        f"Without noise, {closer} of {len(rows)} numbers lie closer to the truth than the paper's printed "
         "estimates; camera noise biases the method, as the curves below show."
     )
-    rows = [
-        (row.parameter, *(f"{v:.5g}" for v in (row.true, row.paper, row.ours, row.standard_error)))
-        for row in result.rows
+    cells = [
+        (row.parameter, *(f"{v:.5g}" for v in (row.true, row.paper, row.ours, row.standard_error))) for row in rows
     ]
-    table = Table(("parameter", "true", "the paper's", "ours", "standard error"), rows, TABLE_CAPTION)
+    table = Table(("parameter", "true", "the paper's", "ours", "standard error"), cells, TABLE_CAPTION)
     noise = [figures[f"noise_{name}"] for name in SHOWN_AGAINST_NOISE]
     return Page(
         "The paper's experiment, run again",
@@ -161,7 +163,7 @@ def _page(result: Reproduction, figures: dict[str, Figure]) -> Page:
 
 
 TABLE_CAPTION = (
-    "True: the paper's simplified robot. Ours: third-order robot without noise, free-run batch on the setup time, then "
+    "True: the paper's simplified robot. Ours: third-order robot without noise, batch on the setup time, then "
     f"recursive least squares. Standard error: of one run at {1e3 * TABLE_NOISE:g} mm of camera noise."
 )
 WHY_NOT_ALL = (
@@ -171,6 +173,6 @@ WHY_NOT_ALL = (
 )
 NOISE_TEXT = (
     "Equation-error estimates regress a noisy increment on its own noisy past, so that their poles shrink towards zero "
-    "as the camera's noise grows; no amount of data cures that. The free-run reading of the start-up cost does not "
-    "regress on measurements and is far less biased."
+    "as the camera's noise grows; no amount of data cures that. `jaxident identify --reading free_run` starts from a "
+    "cost that does not regress on measurements and is far less biased."
 )

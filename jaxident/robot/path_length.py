@@ -6,12 +6,14 @@ chord along the two headings, reversed when it backs.
 
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array, Increment, Pose
 from jaxident.numerics import GAUSS_NODES, GAUSS_WEIGHTS, safe_divide, safe_norm, sin_cos, wrap
 
 
+@jax.jit
 def path_length(poses: Pose) -> Increment:
     """Signed path lengths [m] and turns [rad] between consecutive poses (samples,): arrays (samples - 1,).
 

@@ -25,17 +25,22 @@ def simulate(model: Model, log: Log, *, start: State = AT_REST, key: Array | Non
     if model.effects:
         raise InputError(f"effect {model.effects[0].name!r}: this simulator runs nominal models only")
     _check_one_run(log)
-    unit = None if key is None or model.noise is None else draw_noise(key, len(log.t))
-    if isinstance(model.dynamics, Physical):
-        step = jnp.diff(jnp.asarray(log.t))
-        pose = run_physical(model, log.command, step, start, unit).pose
-    else:
+    if not isinstance(model.dynamics, Physical):
         check_period(model, log)
-        step = model.sample_period
-        pose = run_difference(model.dynamics, model.dead_zone, log.command, start, model.sample_period)
-    if unit is not None and model.noise is not None:
-        pose = observe(pose, model.noise, unit, step)
+    pose = _poses(model, log.t, log.command, start, None if model.noise is None else key)
     return log._replace(x=pose.x, y=pose.y, theta=pose.theta)
+
+
+@jax.jit
+def _poses(model: Model, t: Array, command: Wheels, start: State, key: Array | None) -> Pose:
+    unit = None if key is None else draw_noise(key, len(t))
+    if isinstance(model.dynamics, Physical):
+        step = jnp.diff(t)
+        pose = run_physical(model, command, step, start, unit).pose
+    else:
+        step = model.sample_period
+        pose = run_difference(model.dynamics, model.dead_zone, command, start, model.sample_period)
+    return pose if unit is None or model.noise is None else observe(pose, model.noise, unit, step)
 
 
 def run_physical(model: Model, command: Wheels, step: Array, start: State, unit: UnitNoise | None = None) -> State:

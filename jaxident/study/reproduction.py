@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxident.array_types import AT_REST, Array
+from jaxident.array_types import AT_REST, Array, Pose, Wheels
 from jaxident.estimation import recursive
 from jaxident.estimation.identify import Identification, identify
 from jaxident.estimation.initialise import initialise
@@ -51,7 +51,8 @@ PAPER = (
 FORGETTING = 0.99
 """Forgetting factor of the drift study: a memory of about 100 samples."""
 
-ESTIMATORS = ("one-step batch, 200 samples", "free-run batch, 200 samples", "recursive, 2000 samples")
+ESTIMATORS = ("batch, 200 samples", "recursive, 2000 samples")
+"""The paper's two, both in its own reading (13)-(14), with the measured last increment on the right."""
 
 
 BLOCK = 20
@@ -88,14 +89,18 @@ class Drift(NamedTuple):
 
 
 class Reproduction(NamedTuple):
-    """All that the page of `jaxident reproduce` shows; modelled is the free run of the identified model."""
+    """All that the page of `jaxident reproduce` shows.
+
+    robot made the log, reference is the simplified robot that estimates are scored against, modelled the free run of
+    the identified model. noise may still be computing: read it last.
+    """
 
     robot: Model
+    reference: Model
     log: Log
     found: Identification
     modelled: Log
     prediction: Prediction
-    rows: list[Row]
     noise: NoiseStudy
     drifts: list[Drift]
 
@@ -106,10 +111,16 @@ def paper_log(robot: Model, key: Array) -> Log:
     return Log(*(np.asarray(column) for column in log))
 
 
-def table_rows(reference: Model, found: Model, deviation: Array) -> list[Row]:
-    """The paper's table beside ours; `reference` is the simplified robot that both are scored against."""
-    true, ours = (np.asarray(difference_vector(m.difference, m.dead_zone)) for m in (reference, found))
-    columns = zip(DIFFERENCE_ORDER, true.tolist(), PAPER, ours.tolist(), np.asarray(deviation).tolist(), strict=True)
+def table_rows(result: Reproduction) -> list[Row]:
+    """The paper's table beside ours."""
+    study = result.noise
+    level = NOISE_LEVELS.index(TABLE_NOISE)
+    estimates = np.asarray(study.estimates)[level, :, -1][np.asarray(study.ok)[level, :, -1]]
+    deviation = np.std(estimates, axis=0, ddof=1)
+    true, ours = (
+        np.asarray(difference_vector(m.difference, m.dead_zone)) for m in (result.reference, result.found.model)
+    )
+    columns = zip(DIFFERENCE_ORDER, true.tolist(), PAPER, ours.tolist(), deviation.tolist(), strict=True)
     return [Row(*cells) for cells in columns]
 
 
@@ -132,28 +143,33 @@ def noise_study(log: Log, key: Array, levels: Array, seeds: int) -> NoiseStudy:
 
 
 def _estimate_all(log: Log, level: Array, unit: UnitNoise) -> tuple[Array, Array]:
-    """Estimates (estimators, 12) and convergence (estimators,) on one noisy copy; the recursion starts from the free
-    run's batch."""
+    """Estimates (estimators, 12) and convergence (estimators,) on one noisy copy; the recursion starts from the
+    batch."""
     pose = observe(log.pose, Noise(level, HEADING_PER_POSITION * level), unit, log.t[1] - log.t[0])
     observations = observe_log(log._replace(x=pose.x, y=pose.y, theta=pose.theta))
     early = jax.tree.map(lambda column: column[: SETUP_ROWS - 1], observations)
-    setups = [initialise(early, d_max=D_MAX, reading=reading) for reading in ("one_step", "free_run")]
-    setup = setups[1]
+    setup = initialise(early, d_max=D_MAX, reading="one_step")
     first = recursive.start(setup.difference, setup.dead_zone, early, D_MAX, 1.0)
     last = recursive.run_to_end(first, recursive.tail(observations, SETUP_ROWS - 1))
-    vectors = [difference_vector(s.difference, s.dead_zone) for s in setups]
-    ok = jnp.stack([*(s.ok for s in setups), setup.ok])
-    return jnp.stack([*vectors, difference_vector(*recursive.parameters(last))]), ok
+    batch = difference_vector(setup.difference, setup.dead_zone)
+    final = difference_vector(*recursive.parameters(last))
+    ok = jnp.stack([setup.ok, setup.ok & jnp.all(jnp.isfinite(final))])
+    return jnp.stack([batch, final]), ok
 
 
 def drifting_log(robot: Model, log: Log, gain: Array, widening: Array) -> Log:
     """The log of a robot whose gains are multiplied by `gain` (samples,) and whose dead zones widen by `widening`."""
-    widths = jnp.asarray(robot.dead_zone)[:, None] + widening[:-1]
-    held = jax.tree.map(lambda u: jnp.asarray(u)[:-1], log.command)
-    drive = require_physical(robot)
-    pull = jax.tree.map(lambda f: f * gain[:-1], force(drive, effective_command(held, widths)))
-    pose = run_forces(hold(drive, jnp.asarray(robot.sample_period)), pull, AT_REST).pose
+    pose = _drifting_pose(robot, log.command, gain[:-1], widening[:-1])
     return log._replace(x=np.asarray(pose.x), y=np.asarray(pose.y), theta=np.asarray(pose.theta))
+
+
+@jax.jit
+def _drifting_pose(robot: Model, command: Wheels, gain: Array, widening: Array) -> Pose:
+    held = jax.tree.map(lambda u: u[:-1], command)
+    drive = require_physical(robot)
+    passed = effective_command(held, jnp.asarray(robot.dead_zone)[:, None] + widening)
+    pull = jax.tree.map(lambda f: f * gain, force(drive, passed))
+    return run_forces(hold(drive, jnp.asarray(robot.sample_period)), pull, AT_REST).pose
 
 
 def drift_study(robot: Model, log: Log) -> list[Drift]:
@@ -191,15 +207,12 @@ def reproduce(robot: Model, reference: Model, *, seed: int = 0, seeds: int = 200
     key_input, key_noise = jax.random.split(jax.random.key(seed))
     log = paper_log(robot, key_input)
     with ThreadPoolExecutor() as both:  # most of the time is compilation, which runs side by side
-        later = both.submit(noise_study, jax.tree.map(jnp.asarray, log), key_noise, jnp.array(NOISE_LEVELS), seeds)
+        noise = both.submit(noise_study, jax.tree.map(jnp.asarray, log), key_noise, jnp.array(NOISE_LEVELS), seeds)
         found = identify(log, reading="one_step")
         drifts = drift_study(robot, log)
         modelled = Log(*(np.asarray(column) for column in simulate(found.model, log)))
         prediction = predict(found.model, log, PREDICTED_ROWS)
-        noise = jax.tree.map(np.asarray, later.result())
-    at_table = noise.estimates[NOISE_LEVELS.index(TABLE_NOISE), :, -1]
-    rows = table_rows(reference, found.model, np.nanstd(at_table, axis=0, ddof=1))
-    return Reproduction(robot, log, found, modelled, prediction, rows, noise, drifts)
+        return Reproduction(robot, reference, log, found, modelled, prediction, noise.result(), drifts)
 
 
 def count_closer(rows: list[Row]) -> int:

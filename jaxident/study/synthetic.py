@@ -15,7 +15,7 @@ from jaxident.robot.simulate import simulate
 
 def excite(key: Array, name: str, samples: int, period: float, *, amplitude: float = 1.0, hold: int = 20) -> Log:
     """A log (samples,) of commands alone, even at `period` [s]; name is one of `EXCITATIONS`."""
-    command = EXCITATIONS[name](key, samples, amplitude, hold)
+    command = jax.jit(EXCITATIONS[name], static_argnums=(1, 3))(key, samples, amplitude, hold)
     return make_log(period * np.arange(samples), np.asarray(command.right), np.asarray(command.left))
 
 

@@ -8,8 +8,9 @@ from support.nelder_mead import COSTS, nelder_mead
 from support.records import random_log
 
 from jaxident.errors import InputError
-from jaxident.estimation.initialise import READINGS, initialise
+from jaxident.estimation.initialise import initialise
 from jaxident.estimation.observations import observe_log
+from jaxident.estimation.readings import NAMES as READINGS
 from jaxident.log import Log, make_log
 from jaxident.robot.difference import Difference
 from jaxident.robot.excitation import prbs, staircase
