@@ -99,7 +99,7 @@ def _free_run(model: Model, window: Window) -> Callable[[Array], Pose]:
         return lambda start: run_difference(
             difference, model.dead_zone, window.command, State(*start), model.sample_period
         )
-    passed = effective_command(Wheels(*(u[:-1] for u in window.command)), model.dead_zone)
+    passed = effective_command(window.command, model.dead_zone)
     drive = require_physical(model)
     solution, pull = hold(drive, jnp.diff(window.t)), force(drive, passed)
     return lambda start: run_forces(solution, pull, State(*start)).pose

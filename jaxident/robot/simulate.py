@@ -46,25 +46,31 @@ def _poses(model: Model, t: Array, command: Wheels, start: State, key: Array | N
 def run_physical(model: Model, command: Wheels, step: Array, start: State, unit: UnitNoise | None = None) -> State:
     """States (samples,) at the rows of a run; step [s] is a scalar, or (samples - 1,) from each row to the next."""
     drive = require_physical(model)
-    held = Wheels(*(jnp.asarray(u)[:-1] for u in command))
-    pull = force(drive, effective_command(held, model.dead_zone))
+    pull = force(drive, effective_command(command, model.dead_zone))
     if unit is not None and model.noise is not None:
-        noise = slip(model.noise, UnitNoise(*(draw[:-1] for draw in unit)), step)
+        noise = slip(model.noise, unit, jnp.append(step, 1.0) if jnp.ndim(step) else step)
         pull = Force(pull.along + noise.along, pull.heading + noise.heading)
     return run_forces(hold(drive, jnp.asarray(step)), pull, start)
 
 
 def run_forces(solution: Hold, pull: Force, start: State) -> State:
-    """States (samples + 1,) under given forces (samples,), from the exact solution of one step or of each."""
+    """States (samples,) at the rows of a run under forces (samples,), of which the last acts on nothing any more;
+    `solution` is that of one step, or of each (samples - 1,).
+
+    Trials may follow on a last axis, as in hot paths: every row of the scan then works on contiguous trials and
+    gives one row of the result, and nothing is joined or transposed afterwards, which would cost as much again.
+    """
     even = jnp.ndim(solution.step) == 0
 
     def body(state, now):
-        pull, own = now
+        pull, own, last = now
+        pull = Force(*(jnp.where(last, 0.0, f) for f in pull))  # a last command may be missing
         return advance(state, pull, solution if even else own), state
 
-    start = State(*(s + jnp.zeros(pull.along.shape[1:]) for s in start))
-    last, states = jax.lax.scan(body, start, (pull, None if even else solution))
-    return State(*(jnp.append(column, end) for column, end in zip(states, last, strict=True)))
+    last = jnp.arange(len(pull.along)) == len(pull.along) - 1
+    steps = None if even else jax.tree.map(lambda leaf: jnp.append(leaf, 1.0), solution)
+    start = State(*(s + jnp.zeros_like(pull.along[0]) for s in start))
+    return jax.lax.scan(body, start, (pull, steps, last))[1]
 
 
 def run_difference(difference: Difference, dead_zone: Array, command: Wheels, start: State, period: Array) -> Pose:

@@ -159,15 +159,14 @@ def _estimate_all(log: Log, level: Array, unit: UnitNoise) -> tuple[Array, Array
 
 def drifting_log(robot: Model, log: Log, gain: Array, widening: Array) -> Log:
     """The log of a robot whose gains are multiplied by `gain` (samples,) and whose dead zones widen by `widening`."""
-    pose = _drifting_pose(robot, log.command, gain[:-1], widening[:-1])
+    pose = _drifting_pose(robot, log.command, gain, widening)
     return log._replace(x=np.asarray(pose.x), y=np.asarray(pose.y), theta=np.asarray(pose.theta))
 
 
 @jax.jit
 def _drifting_pose(robot: Model, command: Wheels, gain: Array, widening: Array) -> Pose:
-    held = jax.tree.map(lambda u: u[:-1], command)
     drive = require_physical(robot)
-    passed = effective_command(held, jnp.asarray(robot.dead_zone)[:, None] + widening)
+    passed = effective_command(command, jnp.asarray(robot.dead_zone)[:, None] + widening)
     pull = jax.tree.map(lambda f: f * gain, force(drive, passed))
     return run_forces(hold(drive, jnp.asarray(robot.sample_period)), pull, AT_REST).pose
 

@@ -19,7 +19,14 @@ UNEVEN = np.random.default_rng(0).uniform(0.002, 0.08, STEPS)
 PULL = Force(*(np.random.default_rng(1).uniform(-1, 1, (STEPS, 2)) @ GAIN.T).T)
 
 weights = jax.jit(hold)
-run = jax.jit(lambda physical, pull, step, start: run_forces(hold(physical, step), pull, start))
+
+
+def held(physical, pull, step, start):
+    """States before and after each held force; the last row of a log holds none, which must not matter."""
+    return run_forces(hold(physical, step), Force(*(jnp.append(p, jnp.nan) for p in pull)), start)
+
+
+run = jax.jit(held)
 
 
 def integrate(rate, coupling, pull: Force, step, start: State) -> np.ndarray:
@@ -100,7 +107,7 @@ def test_gradients(step, size):
 
     def score(parameters, start, commands):
         physical = Physical(parameters[:2], parameters[2:6].reshape(2, 2), parameters[6:8] if size == 8 else None)
-        state = run_forces(hold(physical, step), force(physical, Wheels(*commands)), State(*start))
+        state = held(physical, force(physical, Wheels(*commands)), step, State(*start))
         return jnp.sum(weights * jnp.stack(state.pose))
 
     commands = np.random.default_rng(2).uniform(-1, 1, (2, STEPS))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from jaxident.array_types import AT_REST, Pose
-from jaxident.robot.drive import Physical, hold
+from jaxident.robot.drive import Force, Physical, hold
 from jaxident.robot.noise import Noise, UnitNoise, draw_noise, observe, slip
 from jaxident.robot.simulate import run_forces
 
@@ -59,7 +59,8 @@ def test_slip_does_not_depend_on_how_time_is_cut(step):
     noise, drive = Noise(slip_along=0.3, slip_heading=2.0), Physical(jnp.zeros(2), jnp.eye(2))
 
     def end(key):
-        last = run_forces(hold(drive, step), slip(noise, draw_noise(key, len(step)), step), AT_REST)
+        pull = slip(noise, draw_noise(key, len(step)), step)
+        last = run_forces(hold(drive, step), Force(*(jnp.append(p, 0.0) for p in pull)), AT_REST)
         return last.v[-1], last.w[-1]
 
     v, w = jax.jit(jax.vmap(end))(KEYS)
