@@ -53,17 +53,26 @@ def judge(name: str, known: Log, unseen: Log, horizon: int, burn_in: int, baseli
     found = ji.identify(known)
     prediction = ji.predict(found.model, unseen, horizon, burn_in=burn_in)
     ours, told = prediction_error(prediction, unseen), prediction_error(baseline(unseen, prediction), unseen)
-    figure, ax = ji.plot.figure(size=(6.3, 5.0))
-    shown = unseen if len(unseen.runs()) == 1 else join(unseen.runs()[:1])
-    first = prediction.run == prediction.run[0]
-    ji.plot.path(shown, type(prediction)(*(column[first] for column in prediction)), ax=ax)
-    ax.set_title(f"{name}: {ours['position_median']:.3g} m off after {ours['seconds']:.3g} s (median)")
-    ji.plot.save(figure, out / f"{name}.png")
+    draw(name, unseen, prediction, f"{ours['position_median']:.2g} m off after {ours['seconds']:.2g} s (median)", out)
     row = {"robot": name, "seconds": ours["seconds"], "starts": ours["compared"]}
     for label, summary in (("paper", ours), ("commanded", told)):
         row[f"{label}_position"], row[f"{label}_heading"] = summary["position_median"], summary["heading_median"]
     print(row, flush=True)
     return row
+
+
+def draw(name: str, log: Log, prediction, verdict: str, out: pathlib.Path) -> None:
+    """One picture of a log with its predictions; of many short runs the six that move most."""
+    runs = sorted(log.runs(), key=lambda run: -np.hypot(np.nanstd(run.x), np.nanstd(run.y)))[:6]
+    shape = (1, 1, (6.3, 5.2)) if len(runs) == 1 else (2, 3, (8.0, 5.6))
+    figure, axes = ji.plot.figure(*shape[:2], size=shape[2])
+    for run, ax in zip(runs, np.ravel(axes), strict=True):
+        own = prediction.run == run.run[0]
+        ji.plot.path(run, type(prediction)(*(column[own] for column in prediction)), ax=ax)
+        if ax is not np.ravel(axes)[0]:
+            ax.get_legend().remove()
+    figure.supxlabel(f"{name}: {verdict}", fontsize=9)
+    ji.plot.save(figure, out / f"{name}.png")
 
 
 def creates(data: pathlib.Path, robots: list[int], out: pathlib.Path) -> list[dict]:

@@ -25,7 +25,7 @@ NOTE = (
 @click.option(
     "--reading",
     type=click.Choice(["free-run", "one-step"]),
-    default="free-run",
+    default="one-step",
     show_default=True,
     help="How the cost of the start values reads the paper's (21).",
 )

@@ -20,7 +20,7 @@ from jaxident.numerics import require_float64
 from jaxident.robot.model import DIFFERENCE_ORDER, Model, Provenance, Spread, difference_vector
 
 SETUP_SAMPLES = 200
-SETUP_SHARE = 0.2
+SETUP_SHARE = 0.3
 SMALLEST_LOG = 20
 D_MAX_SHARE = 0.9
 
@@ -53,14 +53,14 @@ def identify(
     setup_time: float | None = None,
     forgetting: float = 1.0,
     d_max: float | None = None,
-    reading: str = "free_run",
+    reading: str = "one_step",
 ) -> Identification:
     """The model of the robot behind one or several logs, runs in the order given.
 
     method "paper": batch initialisation on the setup time (section VI), then recursive least squares (15)-(18) over
-    the rest. setup_time [s] counts from the start (default: 200 samples or a fifth, whichever is more); forgetting
+    the rest. setup_time [s] counts from the start (default: 200 samples or three tenths, whichever is more); forgetting
     in (0, 1]; d_max bounds the dead zones [unit of the command] (default: 0.9 of the largest command); reading of
-    (21): "free_run" or "one_step". Needs double precision and an even log; InputError says what a log lacks,
+    (21): "one_step", as the recursion reads it and best on real robots, or "free_run". Needs double precision and an even log; InputError says what a log lacks,
     WorkError that the result is not finite.
     """
     require_float64("identify")

@@ -70,7 +70,7 @@ class Cost(NamedTuple):
         return points[best], costs[best], left.numerator[best]
 
 
-def initialise(observations: Observations, *, d_max: Array, reading: str = "free_run") -> Setup:
+def initialise(observations: Observations, *, d_max: Array, reading: str = "one_step") -> Setup:
     """Minimise J over all twelve parameters, 0 <= D <= d_max, |alpha| < 1 in free run.
 
     J has kinks where a dead zone crosses a level of the commands, and local minima between them. A gradient sees

@@ -136,7 +136,7 @@ def run(estimate: Estimate, observations: Observations) -> tuple[Estimate, tuple
     return jax.lax.scan(body, estimate, observations)
 
 
-def init(log: Log, *, d_max: Array, forgetting: Array = 1.0, reading: str = "free_run") -> State:
+def init(log: Log, *, d_max: Array, forgetting: Array = 1.0, reading: str = "one_step") -> State:
     """State from the setup log (section VI): batch estimate, its covariance, and the last row's command and pose."""
     require_float64("recursive.init")
     observations = observe_log(log)

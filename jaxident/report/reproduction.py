@@ -173,6 +173,6 @@ WHY_NOT_ALL = (
 )
 NOISE_TEXT = (
     "Equation-error estimates regress a noisy increment on its own noisy past, so that their poles shrink towards zero "
-    "as the camera's noise grows; no amount of data cures that. `jaxident identify --reading free_run` starts from a "
+    "as the camera's noise grows; no amount of data cures that. `jaxident identify --reading free-run` starts from a "
     "cost that does not regress on measurements and is far less biased."
 )
