@@ -2,6 +2,7 @@
 
 import click
 
+from jaxident.cli.progress import working
 from jaxident.cli.session import wrote
 
 above_zero = click.FloatRange(0, min_open=True)
@@ -25,15 +26,10 @@ def command(commands, poses, period, track, pose_offset, hold_timeout, out):
     from jaxident.files.logs import write_log
     from jaxident.files.streams import merge, read_commands, read_poses
 
-    log = merge(
-        read_commands(commands),
-        read_poses(poses),
-        period=period,
-        track=track,
-        pose_offset=pose_offset,
-        hold_timeout=hold_timeout,
-    )
-    write_log(log, out)
+    settings = {"period": period, "track": track, "pose_offset": pose_offset, "hold_timeout": hold_timeout}
+    with working("converting"):
+        log = merge(read_commands(commands), read_poses(poses), **settings)
+        write_log(log, out)
     seen = np.count_nonzero(np.isfinite(log.x))
     click.echo(f"{len(log.t)} rows, {seen} with a pose, {log.t[-1] - log.t[0]:.6g} s")
     wrote(out)

@@ -4,6 +4,7 @@ import os
 
 import click
 
+from jaxident.cli.progress import working
 from jaxident.cli.session import seed_option, start_jax, wrote
 
 
@@ -27,8 +28,10 @@ def command(out, seed):
 
     make_folder(out)
     key_robot, key_runs = jax.random.split(jax.random.key(seed))
-    robot = example_robot(key_robot, load_model("published"))
-    for number, run in enumerate(example_runs(key_runs, robot), start=1):
+    with working("simulating"):
+        robot = example_robot(key_robot, load_model("published"))
+        runs = example_runs(key_runs, robot)
+    for number, run in enumerate(runs, start=1):
         path = os.path.join(out, f"real_{number}.csv")
         write_log(run, path)
         wrote(path)

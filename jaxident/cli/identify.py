@@ -4,6 +4,7 @@ import dataclasses
 
 import click
 
+from jaxident.cli.progress import working
 from jaxident.cli.session import json_option, start_jax, table, write_json, wrote
 
 NOTE = (
@@ -45,9 +46,9 @@ def command(logs, method, setup_time, forgetting, d_max, reading, out, json_file
     from jaxident.robot.model import Provenance
 
     records = read_logs(logs)
-    found = identify(
-        records, method, setup_time=setup_time, forgetting=forgetting, d_max=d_max, reading=reading.replace("-", "_")
-    )
+    settings = {"setup_time": setup_time, "forgetting": forgetting, "d_max": d_max}
+    with working("identifying"):
+        found = identify(records, method, reading=reading.replace("-", "_"), **settings)
     origin = Provenance(jaxident.__version__, method, tuple(logs))
     model = dataclasses.replace(found.model, provenance=origin)
     rows = verdicts(model, max(float(abs(u).max()) for record in records for u in record.command))

@@ -2,6 +2,7 @@
 
 import click
 
+from jaxident.cli.progress import working
 from jaxident.cli.session import json_option, start_jax, write_json, wrote
 
 
@@ -28,7 +29,8 @@ def command(model, log, horizon, burn_in, stride, first, last, out, json_file):
     from jaxident.log import between
 
     record = between(read_log(log), first, last)
-    prediction = predict(load_model(model), record, horizon, burn_in=burn_in, stride=stride)
+    with working("predicting"):
+        prediction = predict(load_model(model), record, horizon, burn_in=burn_in, stride=stride)
     write_prediction(prediction, out)
     summary = prediction_error(prediction, record)
     click.echo(

@@ -4,6 +4,7 @@ import os
 
 import click
 
+from jaxident.cli.progress import working
 from jaxident.cli.session import json_option, seed_option, start_jax, table, write_json, wrote
 
 
@@ -27,9 +28,10 @@ def command(out, seeds, seed, json_file):
     from jaxident.study.reproduction import reproduce, table_rows
 
     make_folder(out)
-    result = reproduce(load_model("published"), load_model("published-simplified"), seed=seed, seeds=seeds)
-    paths = write_reproduction(result, out)  # while the noise study still computes
-    rows = table_rows(result)
+    with working("reproducing the paper's experiment"):
+        result = reproduce(load_model("published"), load_model("published-simplified"), seed=seed, seeds=seeds)
+        paths = write_reproduction(result, out)  # while the noise study still computes
+        rows = table_rows(result)
     click.echo(table([("parameter", "true", "paper", "ours", "standard error"), *map(_cells, rows)]))
     for path in paths:
         wrote(path)

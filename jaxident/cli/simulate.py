@@ -2,6 +2,7 @@
 
 import click
 
+from jaxident.cli.progress import working
 from jaxident.cli.session import seed_option, start_jax, wrote
 
 EXCITATION_NAMES = ("staircase", "multilevel", "prbs", "multisine", "chirp")
@@ -53,9 +54,10 @@ def command(model, inputs, excitation, samples, amplitude, hold, noise, out, see
 
     robot = load_model(model)
     key_input, key_noise = jax.random.split(jax.random.key(seed))
-    if inputs is None:
-        log = excite(key_input, excitation, samples, robot.sample_period, amplitude=amplitude, hold=hold)
-    else:
-        log = read_log(inputs)
-    write_log(simulate_runs(robot, log, noise=noise, key=key_noise), out)
+    with working("simulating"):
+        if inputs is None:
+            log = excite(key_input, excitation, samples, robot.sample_period, amplitude=amplitude, hold=hold)
+        else:
+            log = read_log(inputs)
+        write_log(simulate_runs(robot, log, noise=noise, key=key_noise), out)
     wrote(out)

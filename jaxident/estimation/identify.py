@@ -60,8 +60,8 @@ def identify(
     method "paper": batch initialisation on the setup time (section VI), then recursive least squares (15)-(18) over
     the rest. setup_time [s] counts from the start (default: 200 samples or three tenths, whichever is more); forgetting
     in (0, 1]; d_max bounds the dead zones [unit of the command] (default: 0.9 of the largest command); reading of
-    (21): "one_step", as the recursion reads it and best on real robots, or "free_run". Needs double precision and an even log; InputError says what a log lacks,
-    WorkError that the result is not finite.
+    (21): "one_step", as the recursion reads it and best on real robots, or "free_run". Needs double precision and an
+    even log; InputError says what a log lacks, WorkError that the result is not finite.
     """
     require_float64("identify")
     if method != "paper":

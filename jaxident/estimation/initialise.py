@@ -20,7 +20,7 @@ from jaxident.estimation.projection import Projected, linear_residual, profile, 
 from jaxident.estimation.readings import Reading, one_step, reading_of, usable
 from jaxident.robot.difference import Difference
 
-WINDOW, WINDOWS, FINER = 15, 9, 3.0
+WINDOW, WINDOWS, FINER = 21, 11, 2.5
 """The search looks through windows of WINDOW^2 dead zones, the first over all of them, each FINER times as fine as
 the one before: the last tells dead zones 1e-5 of the largest apart."""
 

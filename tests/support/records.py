@@ -60,3 +60,8 @@ def random_log(seed, rows):
     if rng.random() < 0.25:
         p[:, rng.random(rows) < rng.choice([0.03, 0.15])] = np.nan
     return make_log(np.arange(rows) / 30.0, *u, *p, run=run), width
+
+
+def without_poses(log, gone):
+    """The log with the poses of some rows, a mask, missing."""
+    return log._replace(**{name: np.where(gone, np.nan, getattr(log, name)) for name in ("x", "y", "theta")})

@@ -1,0 +1,159 @@
+"""How fast the pipeline is on this machine: its stages alone, whole trials, and the start values."""
+
+import statistics
+import time
+from collections.abc import Callable
+from importlib.metadata import version
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxident.array_types import AT_REST, Array, Increment, Pose, Wheels
+from jaxident.estimation import recursive
+from jaxident.estimation.initialise import Setup, initialise
+from jaxident.estimation.observations import Observations, observe_log
+from jaxident.log import Log
+from jaxident.numerics import require_float64
+from jaxident.robot.excitation import multilevel
+from jaxident.robot.model import Model, difference_vector
+from jaxident.robot.noise import Noise, draw_noise, observe
+from jaxident.robot.path_length import path_length
+from jaxident.robot.simulate import run_physical
+from jaxident.study.batch import in_parallel
+
+TRIALS, SAMPLES = 1024, 2000
+TRIAL_SAMPLES, SETUP_ROWS, D_MAX = 1000, 200, 0.9
+CAMERA = Noise(1e-5, 1e-4)
+BLOCK = 128
+"""Trials at a time in the stages: both covariances of the recursion take 60 kB, which stay in the cache."""
+
+TRIAL_BLOCK = 50
+REPEATS = 7
+
+
+class Bench(NamedTuple):
+    """Nanoseconds per trial-sample of each stage (1024 trials of 2000 samples, double precision), whole trials per
+    second (1000 samples each, noise drawn, start values searched), milliseconds per search, each the median of
+    REPEATS; seconds that the whole trial took to compile; devices and versions."""
+
+    simulate_ns: float
+    path_length_ns: float
+    rls_ns: float
+    noise_ns: float
+    trials_per_s: float
+    initialise_ms: float
+    maximum_likelihood_ms: float | None
+    compile_s: float
+    devices: list[str]
+    versions: dict[str, str]
+
+
+def stages(robot: Model, key: Array) -> dict[str, float]:
+    """Nanoseconds per trial-sample of the simulation, the path length, both recursions and the noise draws."""
+    period = jnp.asarray(robot.sample_period)
+    keys = [(block,) for block in jax.random.split(key, (TRIALS // BLOCK, BLOCK))]
+    commands = in_parallel(jax.jit(jax.vmap(lambda k: multilevel(k, SAMPLES), out_axes=-1)), keys)
+
+    @jax.jit
+    def run(command: Wheels) -> Pose:
+        return run_physical(robot, command, period, AT_REST).pose
+
+    poses, simulate_s = _time(run, [(command,) for command in commands])
+    increments, path_s = _time(path_length, [(pose,) for pose in poses])
+    observations = [_complete(*pair) for pair in zip(commands, increments, strict=True)]
+    first = jax.jit(jax.vmap(lambda setup: _at(robot, setup), in_axes=-1, out_axes=-1))
+    starts = [first(jax.tree.map(lambda column: column[:SETUP_ROWS], o)) for o in observations]
+    _, rls_s = _time(jax.jit(recursive.run_to_end), list(zip(starts, observations, strict=True)))
+    _, noise_s = _time(jax.jit(jax.vmap(lambda k: draw_noise(k, SAMPLES))), keys)
+    seconds = {"simulate_ns": simulate_s, "path_length_ns": path_s, "rls_ns": rls_s, "noise_ns": noise_s}
+    return {name: 1e9 * second / (TRIALS * SAMPLES) for name, second in seconds.items()}
+
+
+def _complete(command: Wheels, increment: Increment) -> Observations:
+    """Observations (samples - 2, trials) of single runs without missing poses, from the second sample on."""
+    now, before = (jax.tree.map(lambda u, cut=cut: u[cut], command) for cut in (slice(1, -1), slice(0, -2)))
+    return Observations(now, before, jax.tree.map(lambda d: d[1:], increment), None, None, None, None)
+
+
+def _at(robot: Model, setup: Observations) -> recursive.Estimate:
+    """The estimate that the recursion starts from: the robot's own parameters."""
+    return recursive.start(robot.difference, jnp.asarray(robot.dead_zone), setup, D_MAX, 1.0)
+
+
+def trial(robot: Model, key: Array) -> tuple[Array, Array]:
+    """One whole trial: own excitation, simulation, camera noise, start values, recursion. Estimate (12,), and ok."""
+    key_input, key_noise = jax.random.split(key)
+    period = jnp.asarray(robot.sample_period)
+    command = multilevel(key_input, TRIAL_SAMPLES)
+    pose = run_physical(robot, command, period, AT_REST).pose
+    pose = observe(pose, CAMERA, draw_noise(key_noise, TRIAL_SAMPLES), period)
+    setup = start_values(command, pose, period)
+    observations = _complete(command, path_length(pose))
+    early = jax.tree.map(lambda column: column[: SETUP_ROWS - 2], observations)
+    first = recursive.start(setup.difference, setup.dead_zone, early, D_MAX, 1.0)
+    last = recursive.run_to_end(first, recursive.tail(observations, SETUP_ROWS - 2))
+    return difference_vector(*recursive.parameters(last)), setup.ok
+
+
+def start_values(command: Wheels, pose: Pose, period: Array) -> Setup:
+    """Start values from the first SETUP_ROWS rows of a trial."""
+    rows = jnp.arange(SETUP_ROWS)
+    early = jax.tree.map(lambda column: column[:SETUP_ROWS], (*command, *pose))
+    u_r, u_l, x, y, theta = early
+    log = Log(rows * period, u_r, u_l, x, y, theta, jnp.zeros_like(rows))
+    return initialise(observe_log(log), d_max=D_MAX)
+
+
+def whole_trials(robot: Model, key: Array, count: int) -> tuple[float, float]:
+    """Whole trials per second, and the seconds to compile them."""
+    keys = [(block,) for block in jax.random.split(key, (count // TRIAL_BLOCK, TRIAL_BLOCK))]
+    program = jax.jit(jax.vmap(lambda k: trial(robot, k)))
+    begin = time.perf_counter()
+    compiled = program.lower(*keys[0]).compile()
+    compile_s = time.perf_counter() - begin
+    return count / _time(compiled, keys)[1], compile_s
+
+
+def start_value_ms(robot: Model, key: Array, count: int) -> float:
+    """Milliseconds that the search for start values takes per trial in a batch of `count`."""
+    period = jnp.asarray(robot.sample_period)
+
+    def noisy(key: Array) -> tuple[Wheels, Pose]:
+        key_input, key_noise = jax.random.split(key)
+        command = multilevel(key_input, SETUP_ROWS)
+        pose = run_physical(robot, command, period, AT_REST).pose
+        return command, observe(pose, CAMERA, draw_noise(key_noise, SETUP_ROWS), period)
+
+    keys = jax.random.split(key, (count // TRIAL_BLOCK, TRIAL_BLOCK))
+    blocks = in_parallel(jax.jit(jax.vmap(noisy)), [(block,) for block in keys])
+    search = jax.jit(jax.vmap(lambda command, pose: start_values(command, pose, period)))
+    return 1e3 * _time(search, blocks)[1] / count
+
+
+def bench(robot: Model, *, trials: int = 1000, seed: int = 0) -> Bench:
+    """All figures; `trials` whole trials, rounded up to whole blocks. Needs double precision."""
+    require_float64("bench")
+    trials = -(-trials // TRIAL_BLOCK) * TRIAL_BLOCK
+    keys = jax.random.split(jax.random.key(seed), 3)
+    per_second, compile_s = whole_trials(robot, keys[1], trials)
+    return Bench(
+        **stages(robot, keys[0]),
+        trials_per_s=per_second,
+        initialise_ms=start_value_ms(robot, keys[2], trials),
+        maximum_likelihood_ms=None,
+        compile_s=compile_s,
+        devices=[str(device) for device in jax.devices()],
+        versions={name: version(name) for name in ("jaxident", "jax", "jaxlib", "numpy", "optimistix")},
+    )
+
+
+def _time(function: Callable[..., Any], blocks: list[tuple[Any, ...]]) -> tuple[list[Any], float]:
+    """The results on all blocks, and the median of REPEATS times [s] after a first call."""
+    results = in_parallel(function, blocks)
+    seconds = []
+    for _ in range(REPEATS):
+        begin = time.perf_counter()
+        in_parallel(function, blocks)
+        seconds.append(time.perf_counter() - begin)
+    return results, statistics.median(seconds)

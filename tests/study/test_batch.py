@@ -1,0 +1,16 @@
+"""Blocks in parallel against a plain loop."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxident.study.batch import in_parallel
+
+
+def test_blocks_in_parallel_are_the_loop_in_order():
+    blocks = [(jnp.arange(5.0) + k, jnp.full(5, k)) for k in range(20)]
+    function = jax.jit(lambda a, b: {"sum": a + b, "product": a * b})
+    for found, block in zip(in_parallel(function, blocks), blocks, strict=True):
+        np.testing.assert_array_equal(found["sum"], block[0] + block[1])
+        np.testing.assert_array_equal(found["product"], block[0] * block[1])
+    assert function._cache_size() == 1
