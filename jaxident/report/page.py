@@ -137,10 +137,10 @@ def _is_number(cell: Any) -> bool:
 
 
 def _written(cell: Any) -> str:
-    """A cell as text: whole numbers in full, others with four digits and a proper minus."""
+    """A cell as text: whole numbers in full, others with five digits and a proper minus."""
     if not _is_number(cell):
         return str(cell)
     if cell is None or math.isnan(cell):
         return NOTHING
     whole = np.asarray(cell).dtype.kind in "iu"
-    return (str(int(cell)) if whole else f"{float(cell):.4g}").replace("-", "\N{MINUS SIGN}")
+    return (str(int(cell)) if whole else f"{float(cell):.5g}").replace("-", "\N{MINUS SIGN}")

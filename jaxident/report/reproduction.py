@@ -144,9 +144,7 @@ def _page(result: Reproduction, rows: list[Row], figures: dict[str, Figure]) -> 
         f"Without noise, {closer} of {len(rows)} numbers lie closer to the truth than the paper's printed "
         "estimates; camera noise biases the method, as the curves below show."
     )
-    cells = [
-        (row.parameter, *(f"{v:.5g}" for v in (row.true, row.paper, row.ours, row.standard_error))) for row in rows
-    ]
+    cells = [tuple(row) for row in rows]
     table = Table(("parameter", "true", "the paper's", "ours", "standard error"), cells, TABLE_CAPTION)
     noise = [figures[f"noise_{name}"] for name in SHOWN_AGAINST_NOISE]
     return Page(

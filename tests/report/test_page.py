@@ -74,11 +74,11 @@ def test_a_figure_is_embedded_whole_and_in_proportion():
     assert (image["width"], image["height"]) == ("720", "360")
 
 
-def test_numbers_stand_to_the_right_with_four_digits():
+def test_numbers_stand_to_the_right_with_five_digits():
     rows = [["a", 1234567, 0.000123456, np.float64(-2.5)], ["b", np.int64(-3), np.nan, None], ["c", 2, np.inf, 1e-12]]
     text = render(page(sections=[Section("s", [Table(["name", "count", "x", "y"], rows)])]))
     cells = re.findall(r'<td class="number">([^<]*)</td>', text)
-    assert cells == ["1234567", "0.0001235", "−2.5", "−3", "–", "–", "2", "inf", "1e−12"]
+    assert cells == ["1234567", "0.00012346", "−2.5", "−3", "–", "–", "2", "inf", "1e−12"]
     assert len(re.findall(r"<td>[abc]</td>", text)) == 3
 
 
