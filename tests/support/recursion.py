@@ -1,0 +1,41 @@
+"""The simplified robot, its logs, and a recursion that is under way."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxident.estimation import recursive
+from jaxident.estimation.observations import observe_log
+from jaxident.log import Log, make_log
+from jaxident.robot.difference import Difference
+from jaxident.robot.excitation import multilevel
+from jaxident.robot.model import Model
+from jaxident.robot.noise import Noise, draw_noise, observe
+from jaxident.robot.simulate import simulate
+
+PERIOD = 1 / 30
+ROBOT = Difference(
+    jnp.array([0.9821, 0.7706]),
+    jnp.array([[7.1181e-5, 7.0344e-5], [0.0341, -0.0333]]),
+    jnp.array([[-7.0697e-5, -6.9978e-5], [-0.0313, 0.0305]]),
+)
+DEAD_ZONE = jnp.array([0.25, 0.20])
+
+
+def record(samples=800, seed=0, noise=None, missing=0.0):
+    """A log of the simplified robot as arrays."""
+    command = multilevel(jax.random.key(seed), samples, 1.0, 10)
+    log = simulate(Model(PERIOD, ROBOT, DEAD_ZONE), make_log(PERIOD * np.arange(samples), *command))
+    if noise is not None:
+        pose = observe(log.pose, Noise(noise, 10 * noise), draw_noise(jax.random.key(seed + 1), samples), PERIOD)
+        log = log._replace(x=pose.x, y=pose.y, theta=pose.theta)
+    hidden = np.random.default_rng(seed).random(samples) < missing
+    return Log(*(jnp.asarray(c) for c in log._replace(x=jnp.where(hidden, jnp.nan, log.x))))
+
+
+def started(log, rows, difference=ROBOT, forgetting=1.0):
+    """Estimate after the first rows, and the samples that follow."""
+    observations = observe_log(log)
+    early = jax.tree.map(lambda c: c[: rows - 1], observations)
+    estimate = recursive.start(difference, DEAD_ZONE, early, 0.9, forgetting)
+    return estimate, recursive.tail(observations, rows - 1)
