@@ -12,16 +12,12 @@ import argparse
 import json
 import pathlib
 
-import jax
+import numpy as np
 
-jax.config.update("jax_enable_x64", True)
-
-import numpy as np  # noqa: E402
-
-import jaxident as ji  # noqa: E402
-from jaxident.estimation.predict import prediction_error  # noqa: E402
-from jaxident.files.streams import merge, read_commands, read_poses  # noqa: E402
-from jaxident.log import Log, between, join  # noqa: E402
+import jaxident as ji
+from jaxident.estimation.predict import prediction_error
+from jaxident.files.streams import merge, read_commands, read_poses
+from jaxident.log import Log, between, join
 
 CREATE_TRACK = 0.258
 PERIOD = 0.05
@@ -109,4 +105,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    ji.start_jax()
     main()

@@ -1,7 +1,7 @@
 """jaxident: identification of differential-drive robots from motor commands and camera poses.
 
-    import jax; jax.config.update("jax_enable_x64", True)
     import jaxident as ji
+    ji.start_jax()
     found = ji.identify(ji.read_log("log.csv"))
 
 Names are looked up on first use, so that importing the package stays light.
@@ -17,6 +17,7 @@ _HOMES = {
     "make_log": "jaxident.log",
     "Wheels": "jaxident.array_types",
     "Pose": "jaxident.array_types",
+    "start_jax": "jaxident.start",
     "State": "jaxident.array_types",
     "Increment": "jaxident.array_types",
     "InputError": "jaxident.errors",

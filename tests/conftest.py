@@ -1,11 +1,12 @@
-"""Double precision for every test; paths of the material that lies beside the project, where it does."""
+"""JAX set up as the program does; paths of the material that lies beside the project, where it does."""
 
 import pathlib
 
-import jax
 import pytest
 
-jax.config.update("jax_enable_x64", True)
+from jaxident.start import start_jax
+
+start_jax(cache=False)  # as the program does
 
 SHARED = pathlib.Path(__file__).resolve().parents[2] / "shared"
 

@@ -8,7 +8,7 @@ import sys
 
 PACKAGE = pathlib.Path(__file__).resolve().parents[1] / "jaxident"
 
-GROUND = ("array_types", "errors", "numerics", "log")
+GROUND = ("array_types", "errors", "numerics", "log", "start")
 FLOORS = (
     ("ground",),
     ("robot",),

@@ -3,7 +3,8 @@
 import click
 
 from jaxident.cli.progress import working
-from jaxident.cli.session import json_option, seed_option, start_jax, table, write_json
+from jaxident.cli.session import json_option, seed_option, table, write_json
+from jaxident.start import start_jax
 
 
 @click.command()

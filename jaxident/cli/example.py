@@ -5,7 +5,8 @@ import os
 import click
 
 from jaxident.cli.progress import working
-from jaxident.cli.session import seed_option, start_jax, wrote
+from jaxident.cli.session import seed_option, wrote
+from jaxident.start import start_jax
 
 
 @click.command()

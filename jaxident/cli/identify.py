@@ -5,7 +5,8 @@ import dataclasses
 import click
 
 from jaxident.cli.progress import working
-from jaxident.cli.session import json_option, start_jax, table, write_json, wrote
+from jaxident.cli.session import json_option, table, write_json, wrote
+from jaxident.start import start_jax
 
 NOTE = (
     "Intervals take the equation error for white. Camera noise makes it coloured and biases these estimates: "

@@ -3,7 +3,8 @@
 import click
 
 from jaxident.cli.progress import working
-from jaxident.cli.session import json_option, start_jax, write_json, wrote
+from jaxident.cli.session import json_option, write_json, wrote
+from jaxident.start import start_jax
 
 
 @click.command()

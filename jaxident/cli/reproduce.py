@@ -5,7 +5,8 @@ import os
 import click
 
 from jaxident.cli.progress import working
-from jaxident.cli.session import json_option, seed_option, start_jax, table, write_json, wrote
+from jaxident.cli.session import json_option, seed_option, table, write_json, wrote
+from jaxident.start import start_jax
 
 
 @click.command()

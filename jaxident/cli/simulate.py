@@ -3,7 +3,8 @@
 import click
 
 from jaxident.cli.progress import working
-from jaxident.cli.session import seed_option, start_jax, wrote
+from jaxident.cli.session import seed_option, wrote
+from jaxident.start import start_jax
 
 EXCITATION_NAMES = ("staircase", "multilevel", "prbs", "multisine", "chirp")
 

@@ -25,8 +25,8 @@ from jaxident.study.batch import in_parallel
 TRIALS, SAMPLES = 1024, 2000
 TRIAL_SAMPLES, SETUP_ROWS, D_MAX = 1000, 200, 0.9
 CAMERA = Noise(1e-5, 1e-4)
-BLOCK = 128
-"""Trials at a time in the stages: both covariances of the recursion take 60 kB, which stay in the cache."""
+BLOCK = 512
+"""Trials at a time in the stages: enough to pay for the start of each kernel, few enough to stay in the cache."""
 
 TRIAL_BLOCK = 50
 REPEATS = 7

@@ -1,0 +1,46 @@
+"""The set-up of JAX, each in a process of its own: it counts only before the first computation."""
+
+import os
+import subprocess
+import sys
+
+PROGRAM = """
+import os, jax, jaxident as ji
+ji.start_jax()
+import jax.numpy as jnp
+
+def body(carry, x):
+    shared = jnp.sin(carry[0]) * x
+    return (shared + carry[1], shared * carry[0]), None
+
+text = jax.jit(lambda a, x: jax.lax.scan(body, (a, a), x)).lower(jnp.ones(8), jnp.ones((5, 8))).compile().as_text()
+print(jnp.ones(1).dtype, any(" = (f64[8]" in line and " fusion(" in line for line in text.splitlines()))
+print(jax.config.jax_compilation_cache_dir)
+print(os.environ["XLA_FLAGS"])
+"""
+
+
+def outcome(**variables: str) -> list[str]:
+    environment = {k: v for k, v in os.environ.items() if k not in ("XLA_FLAGS", "JAXIDENT_CACHE")} | variables
+    run = subprocess.run(
+        [sys.executable, "-c", PROGRAM], env=environment, capture_output=True, text=True, check=True, timeout=120
+    )
+    return run.stdout.splitlines()
+
+
+def test_double_precision_shared_kernels_and_a_cache(tmp_path):
+    precision, cache, _ = outcome(JAXIDENT_CACHE=str(tmp_path / "cache"))
+    assert precision == "float64 True"
+    assert cache == str(tmp_path / "cache")
+    assert (tmp_path / "cache").is_dir()
+
+
+def test_an_empty_cache_variable_turns_the_cache_off():
+    assert outcome(JAXIDENT_CACHE="")[1] == "None"
+
+
+def test_flags_of_the_user_are_kept():
+    kept = outcome(JAXIDENT_CACHE="", XLA_FLAGS="--xla_cpu_enable_fast_math=false")[2]
+    assert kept.startswith("--xla_cpu_enable_fast_math=false --xla_backend_extra_options=")
+    own = "--xla_backend_extra_options=xla_cpu_disable_slp_vectorizer"
+    assert outcome(JAXIDENT_CACHE="", XLA_FLAGS=own)[2] == own
