@@ -6,7 +6,7 @@ in one of the two readings of dl_hat and dtheta_hat of `readings`. The search ru
 alone; `projection` solves for everything else.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import jax
@@ -20,9 +20,14 @@ from jaxident.estimation.projection import Projected, linear_residual, profile, 
 from jaxident.estimation.readings import Reading, one_step, reading_of, usable
 from jaxident.robot.difference import Difference
 
-WINDOW, WINDOWS, FINER = 21, 11, 2.5
-"""The search looks through windows of WINDOW^2 dead zones, the first over all of them, each FINER times as fine as
-the one before: the last tells dead zones 1e-5 of the largest apart."""
+GRID = 21
+"""Dead zones of either wheel in the first look, over all of them."""
+
+WINDOW, WINDOWS, FINER = 11, 15, 1.8
+"""The windows of WINDOW^2 dead zones that follow, each FINER times as fine as the one before."""
+
+FIRST_WINDOW = 2.5
+"""Half-width of the first window in steps of the grid. The last tells dead zones 1e-5 of the largest apart."""
 
 POLES = (0.0, 0.4, 0.65, 0.8, 0.88, 0.94, 0.97, 0.985, 0.9925, 0.998)
 """Poles that a free run starts from: the time constant grows by a half or more from one to the next."""
@@ -30,7 +35,7 @@ POLES = (0.0, 0.4, 0.65, 0.8, 0.88, 0.94, 0.97, 0.985, 0.9925, 0.998)
 POLE_LIMIT = 0.9995
 """Largest pole that a window, which is right to first order alone, may suggest in free run."""
 
-MAX_STEPS = 6
+MAX_STEPS = 4
 RTOL, ATOL = 1e-9, 1e-10
 
 UNKNOWNS = 12
@@ -81,10 +86,11 @@ def initialise(observations: Observations, *, d_max: Array, reading: str = "one_
     weight, count = _linear_weight(observations)
     cost = _cost(observations, read, weight)
     if reading == "one_step":
-        start = _windows(cost, jnp.zeros(2), d_max, WINDOWS)
+        start = _overview(cost, jnp.zeros(2), d_max)
     else:
-        coarse = _windows(_cost(observations, one_step(observations), weight), jnp.zeros(2), d_max, 1)
-        start = _windows(cost, _best_poles(cost, coarse), d_max, WINDOWS)
+        coarse = _overview(_cost(observations, one_step(observations), weight), jnp.zeros(2), d_max)
+        start = _overview(cost, _best_poles(cost, coarse), d_max)
+    start = _windows(cost, start, d_max)
     refined, steps = _refine(cost, read, d_max, start)
     point, lowest, numerator = cost.best(jnp.stack([start, refined]))
     return Setup(
@@ -125,19 +131,25 @@ def _best_poles(cost: Cost, point: Array) -> Array:
     return poles[jnp.argmin(jnp.sum(left**2, axis=2), axis=0)]
 
 
-def _windows(cost: Cost, poles: Array, d_max: Array, count: int) -> Array:
-    """The lowest point (4,) that the first windows find."""
-    sides = jnp.linspace(-1.0, 1.0, WINDOW)
+def _overview(cost: Cost, poles: Array, d_max: Array) -> Array:
+    """The lowest point (4,) of a grid over all dead zones, seen from its middle and some poles."""
+    widths = jnp.linspace(0.0, 1.0, GRID) * d_max
+    return _lowest(cost, jnp.concatenate([jnp.full(2, 0.5 * d_max), poles]), (widths, widths))
+
+
+def _windows(cost: Cost, point: Array, d_max: Array) -> Array:
+    """The lowest point (4,) that ever finer windows find, each around the best of the one before."""
+    offsets = FIRST_WINDOW * d_max / (GRID - 1) * jnp.linspace(-1.0, 1.0, WINDOW)
 
     def look(k, centre):
-        return _lowest(cost, centre, 0.5 * d_max * FINER**-k * sides, d_max)
+        return _lowest(cost, centre, [jnp.clip(d + FINER ** -(1.0 * k) * offsets, 0.0, d_max) for d in centre[:2]])
 
-    return jax.lax.fori_loop(0, count, look, jnp.concatenate([jnp.full(2, 0.5 * d_max), poles]))
+    return jax.lax.fori_loop(0, WINDOWS, look, point)
 
 
-def _lowest(cost: Cost, centre: Array, offsets: Array, d_max: Array) -> Array:
-    """The best point for dead zones at any two of some offsets from a centre."""
-    costs, points = cost.around(centre, *(jnp.clip(d + offsets, 0.0, d_max) for d in centre[:2]))
+def _lowest(cost: Cost, centre: Array, widths: Sequence[Array]) -> Array:
+    """The best point for all pairs of a right and a left dead zone, seen from a centre (4,)."""
+    costs, points = cost.around(centre, *widths)
     return points.reshape(-1, 4)[jnp.argmin(costs)]
 
 

@@ -84,45 +84,61 @@ def profile(reading: Reading, observations: Observations, point: Array, rights: 
     The poles are eliminated like the numerators: exactly in one step, to first order around `point` in free run. A
     few products of all signals serve every pair; cancellation leaves an error of about 1e-13 of the target's square.
     """
-    n, m = len(rights), len(lefts)
-    commands = jnp.stack(observations.command), jnp.stack(observations.command_before)
-    centre = [dead_zone(u, point[:2, None]) for u in commands]
-    passed = [dead_zone(u[k], d[:, None]) for k, d in enumerate((rights, lefts)) for u in commands]
+    commands = observations.command, observations.command_before
+    centre = jnp.vstack([dead_zone(jnp.stack(u), point[:2, None]) for u in commands])
+    right, left = (
+        jnp.vstack([dead_zone(u[wheel], widths[:, None]) for u in commands])
+        for wheel, widths in enumerate((rights, lefts))
+    )
 
     def channel(pole: Array, increments: Array) -> tuple[Array, Array]:
-        columns, target, slope_under = reading.regress(pole, jnp.vstack([*centre, *passed]), increments)
-        slope = slope_under(_fit(columns[:4], target[None])[0][0])
-        right, left = columns[4 : 4 + 2 * n].reshape(2, n, -1), columns[4 + 2 * n :].reshape(2, m, -1)
-        (slopes, both), (_, squares) = _schur(_pairs(right, left, jnp.stack([slope, target])), 4)
-        move = safe_divide(both, slopes, 0.0)
-        return jnp.maximum(squares - move * both, 0.0), pole + move
+        columns, target, slope_under = reading.regress(pole, centre, increments)
+        behind = jnp.stack([slope_under(_fit(columns, target[None])[0][0]), target])
+        right_columns, left_columns = (reading.regress(pole, side, increments).columns for side in (right, left))
+        products = _schur(_pairs(right_columns, left_columns, behind), 4, 6)
+        move = safe_divide(products[4, 5], products[4, 4], 0.0)
+        return jnp.maximum(products[5, 5] - move * products[4, 5], 0.0), pole + move
 
     return jax.vmap(channel)(point[2:], jnp.stack(observations.increment))
 
 
-def _schur(table: Array, count: int) -> Array:
-    """What remains of inner products (n, n, ...) once the first `count` signals have explained their share."""
-    diagonal = [table[i, i] for i in range(count)]
-    for size in diagonal:
-        row = table[0, 1:] * _inverse(table[0, 0], size)
-        table = table[1:, 1:] - table[1:, 0, None] * row
-    return table
+Products = dict[tuple[int, int], Array]
+"""Inner products of signals i <= j, entry by entry: arrays that broadcast against each other over many tables."""
 
 
-def _pairs(right: Array, left: Array, behind: Array) -> Array:
-    """Inner products (6, 6, n, m) of right (2, n, samples), left (2, m, samples) and behind (2, samples) signals, for
-    every pair of a right and a left dead zone. Products of inputs alone are shared where their channels are."""
-    shape = 2, 2, right.shape[1], left.shape[1]
-    blocks = {
-        (0, 0): jnp.einsum("ink,jnk->ijn", right, right)[..., None],
-        (0, 1): jnp.einsum("ink,jmk->ijnm", right, left),
-        (0, 2): jnp.einsum("ink,jk->ijn", right, behind)[..., None],
-        (1, 1): jnp.einsum("imk,jmk->ijm", left, left)[:, :, None],
-        (1, 2): jnp.einsum("imk,jk->ijm", left, behind)[:, :, None],
-        (2, 2): (behind @ behind.T)[..., None, None],
-    }
-    full = [[blocks[i, j] if i <= j else blocks[j, i].swapaxes(0, 1) for j in range(3)] for i in range(3)]
-    return jnp.concatenate([jnp.concatenate([jnp.broadcast_to(b, shape) for b in row], axis=1) for row in full])
+def _schur(products: Products, count: int, size: int) -> Products:
+    """What remains of the inner products of `size` signals once the first `count` have explained their share.
+
+    Entry by entry instead of as one array: the compiler then makes one kernel of the whole elimination.
+    """
+    left = dict(products)
+    for k in range(count):
+        inverse = _inverse(left[k, k], products[k, k])
+        for i in range(k + 1, size):
+            weight = left[k, i] * inverse
+            for j in range(i, size):
+                left[i, j] = left[i, j] - weight * left[k, j]
+    return left
+
+
+def _pairs(right: Array, left: Array, behind: Array) -> Products:
+    """Inner products of two signals each of right (2 n, samples), left (2 m, samples) and behind (2, samples), for
+    every pair of a right and a left dead zone: entries broadcast to (n, m). The signals of k-1 come first, then those
+    of k-2. Products of inputs alone are shared where their channels are."""
+    cross, right_behind, left_behind, own = right @ left.T, right @ behind.T, left @ behind.T, behind @ behind.T
+    n, m = len(right) // 2, len(left) // 2
+    rights, lefts = (slice(0, n), slice(n, None)), (slice(0, m), slice(m, None))
+    entries: Products = {}
+    for i in range(2):
+        for j in range(2):
+            entries[i, 2 + j] = cross[rights[i], lefts[j]]
+            entries[i, 4 + j] = right_behind[rights[i], j, None]
+            entries[2 + i, 4 + j] = left_behind[None, lefts[i], j]
+            if i <= j:
+                entries[i, j] = jnp.sum(right[rights[i]] * right[rights[j]], axis=1)[:, None]
+                entries[2 + i, 2 + j] = jnp.sum(left[lefts[i]] * left[lefts[j]], axis=1)[None]
+                entries[4 + i, 4 + j] = own[i, j]
+    return entries
 
 
 def _inverse(pivot: Array, size: Array) -> Array:

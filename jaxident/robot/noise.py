@@ -39,8 +39,12 @@ class UnitNoise(NamedTuple):
 
 
 def draw_noise(key: Array, samples: int) -> UnitNoise:
-    """Unit noise for a run; the same key gives the same draws at every noise level."""
-    return UnitNoise(*(jax.random.normal(k, (samples,)) for k in jax.random.split(key, 5)))
+    """Unit noise for a run; the same key gives the same draws at every noise level.
+
+    Drawn in single precision, which takes half the time and cuts a draw at 1e-7 of a standard deviation.
+    """
+    draws = (jax.random.normal(k, (samples,), jnp.float32) for k in jax.random.split(key, 5))
+    return UnitNoise(*(draw.astype(float) for draw in draws))
 
 
 def slip(noise: Noise, unit: UnitNoise, step: Array) -> Force:

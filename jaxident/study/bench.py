@@ -28,7 +28,7 @@ CAMERA = Noise(1e-5, 1e-4)
 BLOCK = 512
 """Trials at a time in the stages: enough to pay for the start of each kernel, few enough to stay in the cache."""
 
-TRIAL_BLOCK = 50
+TRIAL_BLOCK = 20
 REPEATS = 7
 
 
