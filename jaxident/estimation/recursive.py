@@ -15,7 +15,7 @@ from jaxident.array_types import Array, Increment, Pose, Wheels
 from jaxident.estimation.initialise import initialise
 from jaxident.estimation.least_squares import LOWER, Equation, equation_from, update
 from jaxident.estimation.observations import Observations, observe_log
-from jaxident.estimation.regressors import Memory, Vector, empty_memory, next_row
+from jaxident.estimation.regressors import UNKNOWNS, Memory, Vector, empty_memory, next_row
 from jaxident.log import Log
 from jaxident.numerics import require_float64, safe_divide
 from jaxident.robot.difference import Difference
@@ -40,7 +40,7 @@ class Estimate(NamedTuple):
     d_max: Any
 
 
-class State(NamedTuple):
+class Stream(NamedTuple):
     """An estimate with the last two commands and the last measured pose: enough to take the next log row."""
 
     estimate: Estimate
@@ -48,6 +48,22 @@ class State(NamedTuple):
     command_before: Wheels
     pose: Pose
     posed: Any
+
+
+class State(NamedTuple):
+    """A Stream in one array: the call of a compiled function takes some microseconds for every array that it passes,
+    and a stream has 118. `unpack` opens it."""
+
+    values: Any
+
+
+_NOTHING = Equation((0.0,) * UNKNOWNS, (0.0,) * len(LOWER), (0.0,) * UNKNOWNS)
+_STILL = Wheels(0.0, 0.0)
+_EMPTY = Stream(
+    Estimate(_NOTHING, _NOTHING, _STILL, empty_memory(), (_STILL, _STILL), 0.0, 0.0),
+    _STILL, _STILL, Pose(0.0, 0.0, 0.0), False,
+)  # fmt: skip
+"""What `unpack` takes the structure from."""
 
 
 class Sample(NamedTuple):
@@ -147,21 +163,35 @@ def init(log: Log, *, d_max: Array, forgetting: Array = 1.0, reading: str = "one
     last = jnp.max(jnp.where(seen, jnp.arange(len(log.t)), -1))
     pose = Pose(*(column[last] for column in log.pose))
     command, before = (Wheels(log.u_r[k], log.u_l[k]) for k in (-1, -2))
-    return State(estimate, command, before, pose, last >= 0)
+    return pack(Stream(estimate, command, before, pose, last >= 0))
 
 
 def step(state: State, sample: Sample) -> tuple[State, Info]:
     """Take one log row: the pose closes the sample begun by the last row's command, the command opens the next."""
+    before = unpack(state)
     pose = Pose(sample.x, sample.y, sample.theta)
     seen = jnp.isfinite(pose.x) & jnp.isfinite(pose.y) & jnp.isfinite(pose.theta)
-    measured = seen & state.posed
-    pose = Pose(*(jnp.where(seen, new, old) for new, old in zip(pose, state.pose, strict=True)))
+    measured = seen & before.posed
+    pose = Pose(*(jnp.where(seen, new, old) for new, old in zip(pose, before.pose, strict=True)))
     moved = increment_between(
-        Pose(*(jnp.where(measured, p, 0.0) for p in state.pose)), Pose(*(jnp.where(measured, p, 0.0) for p in pose))
+        Pose(*(jnp.where(measured, p, 0.0) for p in before.pose)), Pose(*(jnp.where(measured, p, 0.0) for p in pose))
     )
-    observation = Observations(state.command, state.command_before, moved, seen, measured, False, True)
-    estimate, info = absorb(state.estimate, observation)
-    return State(estimate, Wheels(sample.u_r, sample.u_l), state.command, pose, state.posed | seen), info
+    observation = Observations(before.command, before.command_before, moved, seen, measured, False, True)
+    estimate, info = absorb(before.estimate, observation)
+    command = Wheels(sample.u_r, sample.u_l)
+    return pack(Stream(estimate, command, before.command, pose, before.posed | seen)), info
+
+
+def pack(stream: Stream) -> State:
+    """The stream as one array (118,), conditions as 0 and 1."""
+    return State(jnp.stack([jnp.asarray(leaf, float) for leaf in jax.tree.leaves(stream)]))
+
+
+def unpack(state: State) -> Stream:
+    """The stream inside a state."""
+    kinds, structure = jax.tree.flatten(_EMPTY)
+    values = zip(kinds, state.values, strict=True)
+    return jax.tree.unflatten(structure, [value != 0.0 if isinstance(kind, bool) else value for kind, value in values])
 
 
 def parameters(estimate: Estimate) -> tuple[Difference, Array]:

@@ -81,13 +81,13 @@ def test_memory_without_gaps_is_the_general_one():
 def test_step_row_by_row_equals_the_scan(missing):
     log = record(samples=300, noise=1e-5, missing=missing)
     state = recursive.init(log.rows(0, 220), d_max=0.9)
-    estimate, _ = recursive.run(state.estimate, recursive.tail(observe_log(log), 219))
+    estimate, _ = recursive.run(recursive.unpack(state).estimate, recursive.tail(observe_log(log), 219))
     step = jax.jit(recursive.step)
     for k in range(220, 300):
         state, _ = step(state, Sample(log.u_r[k], log.u_l[k], log.x[k], log.y[k], log.theta[k]))
     assert step._cache_size() == 1
     for one, other in zip(
-        jax.tree.leaves(recursive.parameters(state.estimate)),
+        jax.tree.leaves(recursive.parameters(recursive.unpack(state).estimate)),
         jax.tree.leaves(recursive.parameters(estimate)),
         strict=True,
     ):
