@@ -12,7 +12,7 @@ import jax.numpy as jnp
 
 from jaxident.array_types import Array, State
 from jaxident.numerics import GAUSS_WEIGHTS, sin_cos, wrap
-from jaxident.robot.drive import Force, Hold, Response, advance
+from jaxident.robot.drive import Force, Hold, Response
 from jaxident.robot.noise import Noise
 
 
@@ -43,18 +43,40 @@ def first_belief(start: State, noise: Noise) -> Belief:
 
 def scan_filter(solution: Hold, pull: Force, belief: Belief, noise: Noise, run):
     """The filter over all rows: the belief after the last one, and innovations of every row (rows, 3)."""
+    weights = step_weights(solution)
     even = jnp.ndim(solution.step) == 0
     poses = jnp.stack(run.pose, axis=-1)
+    last = jnp.arange(len(pull.along)) == len(pull.along) - 1
+    pulls = jnp.where(last[:, None], 0.0, jnp.stack(pull, axis=-1))  # a last command may be missing
 
     def body(belief, now):
-        pull, own, pose, seen, last = now
+        pull, own, pose, seen = now
         belief, found = take_in(belief, pose, seen, noise)
-        pull = Force(*(jnp.where(last, 0.0, f) for f in pull))
-        return predict_belief(belief, pull, solution if even else own, noise), found
+        return predict_belief(belief, pull, weights if even else own, noise), found
 
-    last = jnp.arange(len(pull.along)) == len(pull.along) - 1
-    steps = None if even else jax.tree.map(lambda leaf: jnp.append(leaf, leaf[-1]), solution)
-    return jax.lax.scan(body, belief, (pull, steps, poses, run.seen, last))
+    steps = None if even else jax.tree.map(lambda leaf: jnp.concatenate([leaf, leaf[-1:]]), weights)
+    return jax.lax.scan(body, belief, (pulls, steps, poses, run.seen))
+
+
+class StepWeights(NamedTuple):
+    """A `Hold` as matrices over (v, w, along, heading): speed and turn at the nodes (nodes, 4), turn, v and w at the
+    end (3, 4); step [s]. All with leading axis (rows - 1,) for uneven steps."""
+
+    step: Any
+    node_v: Any
+    node_turn: Any
+    end: Any
+
+
+def step_weights(solution: Hold) -> StepWeights:
+    """The exact solution over a step as matrices."""
+
+    def rows(responses: tuple[Response, ...]) -> Array:
+        zero = jnp.zeros_like(solution.step)
+        return jnp.stack([jnp.stack([zero if r is None else r for r in one], -1) for one in responses], -2)
+
+    end = rows((solution.turn, solution.v, solution.w))
+    return StepWeights(solution.step, rows(solution.node_v), rows(solution.node_turn), end)
 
 
 def take_in(belief: Belief, pose: Array, seen: Array, noise: Noise) -> tuple[Belief, tuple[Array, Array]]:
@@ -75,54 +97,41 @@ def take_in(belief: Belief, pose: Array, seen: Array, noise: Noise) -> tuple[Bel
     return Belief(mean, covariance), (normalised, log_variance)
 
 
-def predict_belief(belief: Belief, pull: Force, solution: Hold, noise: Noise) -> Belief:
-    """The belief one step later."""
-    state = State(*belief.mean[:5])
-    transition, entry = slopes(state, pull, solution)
-    density = jnp.stack([noise.slip_along, noise.slip_heading])
-    entry = entry * (density / jnp.sqrt(solution.step))
-    slip = jnp.sum(entry[:, None, :] * entry[None, :, :], axis=-1)
-    mean = jnp.stack(advance(state, pull, solution))
+def predict_belief(belief: Belief, pull: Array, weights: StepWeights, noise: Noise) -> Belief:
+    """The belief one step later under accelerations (2,) along and in heading."""
+    state, transition, entry = advance_with_slopes(belief.mean[:5], pull, weights)
+    entry = entry * (jnp.stack([noise.slip_along, noise.slip_heading]) / jnp.sqrt(weights.step))
     if noise.correlation_time is None:
-        return Belief(mean, _carry(_carry(belief.covariance, transition).T, transition) + slip)
-    left = jnp.exp(-solution.step / noise.correlation_time)
-    fresh = (1.0 - left**2) * jnp.stack([noise.position, noise.position, noise.heading]) ** 2
-    p = belief.covariance
-    cross = left * _carry(p[:5, 5:], transition)
-    states = _carry(_carry(p[:5, :5], transition).T, transition) + slip
-    errors = left**2 * p[5:, 5:] + jnp.diag(fresh)
-    return Belief(
-        jnp.concatenate([mean, left * belief.mean[5:]]),
-        jnp.concatenate([jnp.concatenate([states, cross], 1), jnp.concatenate([cross.T, errors], 1)], 0),
-    )
+        left, fresh, mean = jnp.ones(0), jnp.ones(0), state
+    else:
+        left = jnp.full(3, jnp.exp(-weights.step / noise.correlation_time))
+        fresh = (1.0 - left**2) * jnp.stack([noise.position, noise.position, noise.heading]) ** 2
+        mean = jnp.concatenate([state, left * belief.mean[5:]])
+    size = len(mean)
+    whole = jnp.zeros((size, size)).at[:5, :5].set(transition)
+    whole = whole + jnp.diag(jnp.concatenate([jnp.zeros(5), left]))
+    entry = jnp.zeros((size, 2)).at[:5].set(entry)
+    covariance = _multiply(_multiply(whole, belief.covariance), whole.T) + _multiply(entry, entry.T)
+    return Belief(mean, covariance + jnp.diag(jnp.concatenate([jnp.zeros(5), fresh])))
 
 
-def slopes(state: State, pull: Force, solution: Hold) -> tuple[Array, Array]:
-    """Derivatives of the state one step later: by the state (5, 5), and by a held acceleration (5, 2)."""
-    start = (state.v, state.w, pull.along, pull.heading)
-    along_x, along_y = jnp.zeros(4), jnp.zeros(4)
-    x = y = 0.0
-    for weight, node_v, node_turn in zip(GAUSS_WEIGHTS, solution.node_v, solution.node_turn, strict=True):
-        by_v, by_turn = _row(node_v), _row(node_turn)
-        sine, cosine = sin_cos(state.theta + _dot(by_turn, start))
-        v = _dot(by_v, start)
-        along_x = along_x + weight * (cosine * by_v - v * sine * by_turn)
-        along_y = along_y + weight * (sine * by_v + v * cosine * by_turn)
-        x, y = x + weight * v * cosine, y + weight * v * sine
-    h = solution.step
-    by_speed = jnp.stack([h * along_x, h * along_y, _row(solution.turn), _row(solution.v), _row(solution.w)])
-    by_pose = jnp.eye(5, 3).at[0, 2].set(-h * y).at[1, 2].set(h * x)
-    return jnp.concatenate([by_pose, by_speed[:, :2]], axis=1), by_speed[:, 2:]
+def advance_with_slopes(state: Array, pull: Array, weights: StepWeights) -> tuple[Array, Array, Array]:
+    """The state (5,) one step later, its derivatives by the state (5, 5), and by a held acceleration (5, 2)."""
+    start = jnp.concatenate([state[3:], pull])
+    gauss = weights.step * jnp.asarray(GAUSS_WEIGHTS)
+    sine, cosine = sin_cos(state[2] + jnp.sum(weights.node_turn * start, axis=1))
+    v = jnp.sum(weights.node_v * start, axis=1)
+    moved = jnp.stack([jnp.sum(gauss * v * cosine), jnp.sum(gauss * v * sine)])
+    sideways, forward = (gauss * v * sine)[:, None], (gauss * v * cosine)[:, None]
+    along_x = jnp.sum((gauss * cosine)[:, None] * weights.node_v - sideways * weights.node_turn, axis=0)
+    along_y = jnp.sum((gauss * sine)[:, None] * weights.node_v + forward * weights.node_turn, axis=0)
+    by_speed = jnp.concatenate([jnp.stack([along_x, along_y]), weights.end])
+    by_pose = jnp.eye(5, 3).at[0, 2].set(-moved[1]).at[1, 2].set(moved[0])
+    end = jnp.sum(weights.end * start, axis=1)
+    after = jnp.concatenate([state[:2] + moved, state[2:3] + end[:1], end[1:]])
+    return after, jnp.concatenate([by_pose, by_speed[:, :2]], axis=1), by_speed[:, 2:]
 
 
-def _row(response: Response) -> Array:
-    return jnp.stack([jnp.zeros(()) if weight is None else jnp.asarray(weight) for weight in response])
-
-
-def _dot(row: Array, start: tuple) -> Array:
-    return sum(row[k] * value for k, value in enumerate(start))
-
-
-def _carry(matrix: Array, transition: Array) -> Array:
-    """transition @ matrix, in plain arithmetic that maps over trials."""
-    return jnp.sum(transition[:, :, None] * matrix[None, :, :], axis=1)
+def _multiply(left: Array, right: Array) -> Array:
+    """left @ right in plain arithmetic, which maps over trials."""
+    return jnp.sum(left[:, :, None] * right[None, :, :], axis=1)

@@ -11,13 +11,13 @@ from jaxident.estimation.likelihood import Innovations, innovations
 from jaxident.estimation.parameters import Law, Robot, from_vector, to_vector
 from jaxident.estimation.runs import Runs, cut_windows, run_axes
 from jaxident.estimation.scoring import Point, Search, covariance_at, search_from
-from jaxident.estimation.starter import first_estimate, start_states
+from jaxident.estimation.starter import Start, first_estimate, start_states
 from jaxident.robot.drive import Physical
 from jaxident.robot.noise import Noise
 
 WINDOW = 200
 """Rows of the windows that the starter fits: long enough for a slow pole, too short for slip to pile up."""
-MOST_STEPS = 60
+MOST_STEPS = 40
 WHITE = Law()
 
 
@@ -39,32 +39,46 @@ class Fit(NamedTuple):
     steps: Any
 
 
-def start_point(runs: Runs, d_max: Array, law: Law, window: int = WINDOW) -> Point:
-    """Where the search begins: the starter's estimate on windows of the runs, its residuals as camera noise."""
+class Beginning(NamedTuple):
+    """Where searches begin, whatever the law: the starter's estimate, and states (runs, 5) at each run's first row."""
+
+    estimate: Start
+    starts: Any
+
+
+@partial(jax.jit, static_argnames=("window",))
+def begin(runs: Runs, d_max: Array, window: int = WINDOW) -> Beginning:
+    """The starter's estimate on windows of some rows of the runs (runs, rows)."""
     windows = cut_windows(runs, min(window, runs.seen.shape[1]))
-    start = first_estimate(windows, d_max)
+    estimate = first_estimate(windows, d_max)
     per_run = windows.seen.shape[0] // runs.seen.shape[0]
-    states = start_states(start, windows)[::per_run]
-    step = jnp.mean(runs.step)
-    position, heading = jnp.maximum(start.residual, 1e-9)
-    lag = 1.0 / step
-    noise = Noise(position, heading, 2.0 * step, 0.1 * position * lag**1.5, 0.1 * heading * lag**1.5)
-    coupling = jnp.zeros(2) if law.coupling else None
-    return Point(to_vector(Robot(Physical(start.rate, start.gain, coupling), start.dead_zone, noise), law), states)
+    first = jax.tree.map(lambda leaf: leaf[::per_run] if jnp.ndim(leaf) else leaf, windows)
+    return Beginning(estimate, start_states(estimate, first))
 
 
-@partial(jax.jit, static_argnames=("law", "window"))
+def first_point(beginning: Beginning, step: Array, law: Law) -> Point:
+    """The point of a beginning under a law: residuals as camera noise, a memory of two steps [s], slip that adds a
+    tenth of the residual per step."""
+    estimate, starts = beginning
+    position, heading = jnp.maximum(estimate.residual, 1e-9)
+    slip = 0.1 / jnp.mean(step) ** 1.5
+    noise = Noise(position, heading, 2.0 * jnp.mean(step), slip * position, slip * heading)
+    drive = Physical(estimate.rate, estimate.gain, jnp.zeros(2) if law.coupling else None)
+    return Point(to_vector(Robot(drive, estimate.dead_zone, noise), law), starts)
+
+
 def fit_runs(runs: Runs, d_max: Array, law: Law = WHITE, window: int = WINDOW) -> Fit:
     """The estimate from runs (runs, rows) under a law, from the data alone; pure, maps over trials.
 
     d_max: largest dead zone [unit of the command]. A fit that fails comes back finite where it stopped, ok False.
     """
-    return fit_from(start_point(runs, d_max, law, window), runs, d_max, law)
+    return fit_from(begin(runs, d_max, window), runs, d_max, law)
 
 
-def fit_from(point: Point, runs: Runs, d_max: Array, law: Law) -> Fit:
-    """The estimate by a search from a given point."""
-    search = search_from(point, runs, law, d_max, MOST_STEPS)
+@partial(jax.jit, static_argnames=("law",))
+def fit_from(beginning: Beginning, runs: Runs, d_max: Array, law: Law) -> Fit:
+    """The estimate by a search from a given beginning."""
+    search = search_from(first_point(beginning, runs.step, law), runs, law, d_max, MOST_STEPS)
     covariance = covariance_at(search.point, search.local, law)
     found = jax.vmap(lambda start, run: innovations(search.point.shared, start, run, law), in_axes=(0, run_axes(runs)))(
         search.point.starts, runs

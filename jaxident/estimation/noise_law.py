@@ -1,11 +1,12 @@
 """Which noise law the data ask for: white camera error where the residuals are white, else the likeliest law."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.errors import InputError
-from jaxident.estimation.maximum_likelihood import Fit, fit_runs
+from jaxident.estimation.maximum_likelihood import Fit, begin, fit_from
 from jaxident.estimation.parameters import Law, names
 from jaxident.estimation.runs import Runs
 
@@ -25,24 +26,21 @@ WHITE = 30.6
 def fit_law(runs: Runs, d_max: Array, noise_law: str, coupling: bool) -> tuple[Fit, Law]:
     """The fit under a named law, or under the one that "auto" finds.
 
-    "auto" keeps white camera error if the residuals of that fit are white, and otherwise takes the law with the lowest
-    Bayesian information criterion (Schwarz 1978).
+    "auto" keeps white camera error if the residuals of that fit are white; otherwise it adds a memory or slip, and
+    where that leaves them coloured too, both. Of what it has tried it takes the lowest Bayesian information criterion
+    (Schwarz 1978).
     """
     if noise_law not in (*NOISE_LAWS, "auto"):
         raise InputError(f"noise law {noise_law!r}: choose from {', '.join((*NOISE_LAWS, 'auto'))}")
-    if noise_law != "auto":
-        law = NOISE_LAWS[noise_law]._replace(coupling=coupling)
-        return fit_runs(runs, d_max, law), law
-    white = Law(coupling=coupling)
-    fit = fit_runs(runs, d_max, white)
-    if bool(fit.ok) and float(whiteness(fit.innovations.normalised, runs.seen)) < WHITE:
-        return fit, white
-    laws = [law._replace(coupling=coupling) for law in NOISE_LAWS.values()]
-    fits = [fit, *(fit_runs(runs, d_max, law) for law in laws[1:])]
-    count = 3 * int(np.sum(runs.seen))
-    criteria = [criterion(fit, law, count) for fit, law in zip(fits, laws, strict=True)]
-    best = int(np.argmin(criteria))
-    return fits[best], laws[best]
+    beginning = begin(runs, d_max)
+    tried: list[tuple[Fit, Law]] = []
+    for laws in (("white",), ("ar1", "slip"), ("slip-ar1",)) if noise_law == "auto" else ((noise_law,),):
+        for law in (NOISE_LAWS[name]._replace(coupling=coupling) for name in laws):
+            tried.append((fit_from(beginning, runs, d_max, law), law))
+        fit, law = min(tried, key=lambda pair: criterion(pair[0], pair[1], 3 * int(np.sum(runs.seen))))
+        if bool(fit.ok) and float(whiteness(fit.innovations.normalised, runs.seen)) < WHITE:
+            break
+    return fit, law
 
 
 def criterion(fit: Fit, law: Law, count: int) -> float:
@@ -51,6 +49,7 @@ def criterion(fit: Fit, law: Law, count: int) -> float:
     return value if bool(fit.ok) and np.isfinite(value) else np.inf
 
 
+@jax.jit
 def whiteness(normalised: Array, seen: Array) -> Array:
     """Sum over three channels and LAGS of n r^2, r the correlation of innovations (runs, 3, rows) at a lag: about
     chi-squared with 15 degrees of freedom for white ones (Box and Pierce 1970)."""

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxident.array_types import Array, Wheels
+from jaxident.array_types import Array
 from jaxident.estimation.runs import Runs
 from jaxident.numerics import hold_integrals, safe_divide, sin_cos
 from jaxident.robot.dead_zone import dead_zone
@@ -111,18 +111,16 @@ def _search(pair: tuple, windows: Runs, rates: Array, widths: Array, counts: Arr
 
 
 def _fit(channel: Channel, windows: Runs, rates: Array, grid: Array) -> Fits:
-    """Least squares in both gains and every window's start, for all rates and pairs of dead zones."""
-    axis = None if jnp.ndim(windows.step) == 0 else 0
-
-    def moments(channel, step, command, time):
-        return jax.vmap(lambda rate: _moments(channel, step, command, grid, rate))(rates)
-
-    every = jax.vmap(moments, in_axes=(0, axis, 0, None))(channel, windows.step, windows.command, None)
-    gram, cross, power = (jnp.sum(part, axis=0) for part in every)
-    right, left = gram[:, 0, 0], gram[:, 1, 1]
-    a = jnp.diagonal(right, axis1=1, axis2=2)[:, :, None]
-    c = jnp.diagonal(left, axis1=1, axis2=2)[:, None, :]
-    b, u, v = gram[:, 0, 1], cross[:, 0, :, None], cross[:, 1, None, :]
+    """Least squares in both gains and every window's start, for all rates and pairs of dead zones (2, widths)."""
+    passed = [dead_zone(u.T[..., None], widths) for u, widths in zip(windows.command, grid, strict=True)]
+    pull = jnp.concatenate(passed, axis=-1)
+    step = windows.step if jnp.ndim(windows.step) == 0 else windows.step.T[..., None]
+    products = jax.lax.map(lambda rate: _products(channel, step, pull, rate), rates)
+    widths = grid.shape[1]
+    gram, cross, power = products[:, :-1, :-1], products[:, :-1, -1], products[:, -1, -1]
+    a, c = (jnp.diagonal(gram[:, cut, cut], axis1=1, axis2=2) for cut in (slice(None, widths), slice(widths, None)))
+    a, b, c = a[:, :, None], gram[:, :widths, widths:], c[:, None, :]
+    u, v = cross[:, :widths, None], cross[:, None, widths:]
     determinant = a * c - b * b
     regular = determinant > 1e-9 * a * c
     safe = jnp.where(regular, determinant, 1.0)
@@ -131,62 +129,54 @@ def _fit(channel: Channel, windows: Runs, rates: Array, grid: Array) -> Fits:
     return Fits(jnp.maximum(squares, 1e-14 * power[:, None, None] + 1e-300), jnp.stack(gains, axis=-1))
 
 
-def _moments(channel: Channel, step: Array, command: Wheels, grid: Array, rate: Array):
-    """Gram matrix (wheels, wheels, widths, widths), products with the data (wheels, widths) and the data's power of one
-    window at one rate, start position and start speed projected out."""
-    weight = channel.weight[:, None]
-
-    def centred(coordinates):
-        mean = jnp.sum(weight[..., None] * coordinates, axis=0) / jnp.maximum(jnp.sum(channel.weight), 1.0)
-        return weight[..., None] * (coordinates - mean)
-
-    passed = jnp.stack([dead_zone(u[:, None], widths) for u, widths in zip(command, grid, strict=True)], axis=1)
-    laid = centred(_lay(rate, step, passed.reshape(len(passed), -1), channel.direction))
-    data = centred(channel.measured[:, None, :])
-    table = jnp.concatenate([laid, data], axis=1).transpose(1, 0, 2).reshape(laid.shape[1] + 1, -1)
-    products = table @ table.T
-    free = products[1:, 1:] - safe_divide(
-        products[1:, :1] * products[:1, 1:], products[0, 0], jnp.zeros_like(products[1:, 1:])
-    )
-    wheels, widths = grid.shape
-    gram = free[:-1, :-1].reshape(wheels, widths, wheels, widths).transpose(0, 2, 1, 3)
-    return gram, free[:-1, -1].reshape(wheels, widths), free[-1, -1]
+def _products(channel: Channel, step: Array, pull: Array, rate: Array) -> Array:
+    """Inner products (columns + 1, columns + 1) at one rate of the paths that accelerations (rows, windows, columns)
+    cause and, last, of the data; start position and start speed of every window projected out."""
+    measured, direction = (jnp.moveaxis(part, 0, 1)[:, :, None] for part in (channel.measured, channel.direction))
+    weight = channel.weight.T[:, :, None, None]
+    table = jnp.concatenate([_lay(rate, step, pull, direction), measured], axis=2)
+    mean = jnp.sum(weight * table, axis=0) / jnp.maximum(jnp.sum(weight, axis=0), 1.0)
+    table = weight * (table - mean)
+    coast = table[:, :, :1]
+    power = jnp.sum(coast**2, axis=(0, 3), keepdims=True)
+    share = safe_divide(jnp.sum(coast * table, axis=(0, 3), keepdims=True), power, jnp.zeros(()))
+    free = jnp.moveaxis(table - share * coast, 2, 0)[1:].reshape(table.shape[2] - 1, -1)
+    return free @ free.T
 
 
 def _lay(rate: Array, step: Array, pull: Array, direction: Array) -> Array:
-    """Coordinates (rows, 1 + columns, coordinates) of paths laid along a direction per row (rows, coordinates): first
-    that of coasting from speed 1, then those from rest under accelerations (rows, columns)."""
-    holds = (jnp.broadcast_to(p, pull.shape[:1]) for p in hold_integrals(rate, step))
-    pull = jnp.concatenate([jnp.zeros_like(pull[:, :1]), pull], axis=1)
+    """Coordinates (rows, windows, 1 + columns, coordinates) of paths laid along a direction per row (rows, windows, 1,
+    coordinates): first of coasting from speed 1, then from rest under accelerations (rows, windows, columns)."""
+    holds = (jnp.broadcast_to(part, (*pull.shape[:2], 1)) for part in hold_integrals(rate, step))
+    pull = jnp.concatenate([jnp.zeros_like(pull[..., :1]), pull], axis=-1)
 
     def body(now, row):
         speed, place = now
         decay, once, twice, pull, direction = row
-        place_next = place + (once * speed + twice * pull)[:, None] * direction
-        return (decay * speed + once * pull, place_next), place
+        moved = place + (once * speed + twice * pull)[..., None] * direction
+        return (decay * speed + once * pull, moved), place
 
-    columns = pull.shape[1]
-    first = jnp.zeros(columns).at[0].set(1.0), jnp.zeros((columns, direction.shape[1]))
-    return jax.lax.scan(body, first, (*holds, pull, direction))[1]
+    first = jnp.zeros(pull.shape[1:]).at[:, 0].set(1.0)
+    return jax.lax.scan(body, (first, jnp.zeros((*first.shape, direction.shape[-1]))), (*holds, pull, direction))[1]
 
 
 def start_states(start: Start, windows: Runs) -> Array:
     """The state (windows, 5) x, y, theta, v, w at the first row of every window, by the same least squares."""
-    pair = channels(windows)
+    step = windows.step if jnp.ndim(windows.step) == 0 else windows.step.T[..., None]
+    passed = [dead_zone(u.T, width) for u, width in zip(windows.command, start.dead_zone, strict=True)]
 
-    def of_window(step, command, channel, row):
-        passed = [dead_zone(u, width) for u, width in zip(command, start.dead_zone, strict=True)]
-        pull = sum(gain * m for gain, m in zip(start.gain[row], passed, strict=True))
-        laid = _lay(start.rate[row], step, pull[:, None], channel.direction)
-        weight = channel.weight[:, None]
-        count = jnp.maximum(jnp.sum(channel.weight), 1.0)
-        rest = channel.measured - laid[:, 1]
-        mean_coast, mean_rest = (jnp.sum(weight * c, axis=0) / count for c in (laid[:, 0], rest))
-        centred = weight * (laid[:, 0] - mean_coast)
-        speed = safe_divide(jnp.sum(centred * rest), jnp.sum(centred**2), jnp.zeros(()))
-        return mean_rest - speed * mean_coast, speed
+    def of_channel(channel, row):
+        measured, direction = (jnp.moveaxis(part, 0, 1)[:, :, None] for part in (channel.measured, channel.direction))
+        weight = channel.weight.T[:, :, None, None]
+        pull = sum(gain * m for gain, m in zip(start.gain[row], passed, strict=True))[..., None]
+        laid = _lay(start.rate[row], step, pull, direction)
+        coast, rest = laid[:, :, :1], measured - laid[:, :, 1:]
+        count = jnp.maximum(jnp.sum(weight, axis=0), 1.0)
+        mean_coast, mean_rest = (jnp.sum(weight * part, axis=0) / count for part in (coast, rest))
+        centred = weight * (coast - mean_coast)
+        power = jnp.sum(centred**2, axis=(0, 3))
+        speed = safe_divide(jnp.sum(centred * rest, axis=(0, 3)), power, jnp.zeros(()))
+        return mean_rest[:, 0] - speed * mean_coast[:, 0], speed
 
-    axis = None if jnp.ndim(windows.step) == 0 else 0
-    over = jax.vmap(of_window, in_axes=(axis, 0, 0, None))
-    (position, v), (heading, w) = (over(windows.step, windows.command, c, row) for row, c in enumerate(pair))
-    return jnp.concatenate([position, heading, v[:, None], w[:, None]], axis=1)
+    (position, v), (heading, w) = (of_channel(channel, row) for row, channel in enumerate(channels(windows)))
+    return jnp.concatenate([position, heading, v, w], axis=1)
