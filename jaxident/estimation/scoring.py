@@ -60,22 +60,11 @@ class Search(NamedTuple):
 def local_at(point: Point, runs: Runs, law: Law) -> Local:
     """Value, gradient and expected curvature at a point, by forward-mode derivatives through the simulator."""
 
-    def of_run(start, run):
-        def both(unknowns):
-            z, log_variance = innovations(unknowns[:-START_STATES], unknowns[-START_STATES:], run, law)
-            return (z, log_variance), (z, log_variance)
-
-        (dz, dlog), (z, log_variance) = jax.jacfwd(both, has_aux=True)(jnp.concatenate([point.shared, start]))
-        count = dz.shape[-1]
-        dz, dlog = dz.reshape(-1, count), dlog.reshape(-1, count)
-        z, log_variance = z.ravel(), log_variance.ravel()
-        error = dz + 0.5 * z[:, None] * dlog
-        curvature = error.T @ error + 0.5 * dlog.T @ dlog
-        gradient = dz.T @ z + 0.5 * jnp.sum(dlog, axis=0)
-        return 0.5 * jnp.sum(z**2 + log_variance), gradient, curvature
-
-    value, gradient, curvature = jax.vmap(of_run, in_axes=(0, run_axes(runs)))(point.starts, runs)
+    of_run = _general_local if law.memory or law.slip else _white_local
     cut = len(names(law))
+    unknowns = jnp.concatenate([jnp.tile(point.shared, (len(point.starts), 1)), point.starts], axis=1)
+    over = jax.vmap(lambda own, run: of_run(own, run, law), in_axes=(0, run_axes(runs)))
+    value, gradient, curvature = over(unknowns, runs)
     return Local(
         jnp.sum(value),
         Point(jnp.sum(gradient[:, :cut], axis=0), gradient[:, cut:]),
@@ -83,6 +72,45 @@ def local_at(point: Point, runs: Runs, law: Law) -> Local:
         curvature[:, cut:, cut:],
         curvature[:, :cut, cut:],
     )
+
+
+def _general_local(unknowns: Array, run: Runs, law: Law) -> tuple[Array, Array, Array]:
+    """Value, gradient and curvature of one run in its shared and own unknowns (n,)."""
+
+    def both(unknowns):
+        found = innovations(unknowns[:-START_STATES], unknowns[-START_STATES:], run, law)
+        return found, found
+
+    slopes, found = jax.jacfwd(both, has_aux=True)(unknowns)
+    dz, dlog = (part.reshape(-1, len(unknowns)) for part in slopes)
+    z, log_variance = found.normalised.ravel(), found.log_variance.ravel()
+    error = dz + 0.5 * z[:, None] * dlog
+    gradient = dz.T @ z + 0.5 * jnp.sum(dlog, axis=0)
+    return 0.5 * jnp.sum(z**2 + log_variance), gradient, error.T @ error + 0.5 * dlog.T @ dlog
+
+
+def _white_local(unknowns: Array, run: Runs, law: Law) -> tuple[Array, Array, Array]:
+    """The same where the camera error is white and nothing slips: both deviations enter in closed form."""
+    first = names(law).index("position")
+    deviations = unknowns[first : first + 2]
+    others = jnp.concatenate([unknowns[:first], unknowns[first + 2 :]])
+
+    def both(others):
+        shared = jnp.concatenate([others[:first], deviations])
+        found = innovations(shared, others[first:], run, law)
+        return found.normalised, found
+
+    slope, found = jax.jacfwd(both, has_aux=True)(others)
+    slope, z = slope.reshape(-1, len(others)), found.normalised
+    seen = jnp.sum(run.seen)
+    count, squares = jnp.stack([2 * seen, seen]), jnp.stack([jnp.sum(z[:2] ** 2), jnp.sum(z[2] ** 2)])
+    place = jnp.concatenate([jnp.arange(first), jnp.arange(first + 2, len(unknowns))])
+    curvature = jnp.zeros((len(unknowns),) * 2).at[place[:, None], place].set(slope.T @ slope)
+    gradient = jnp.zeros(len(unknowns)).at[place].set(slope.T @ z.ravel())
+    where = first + jnp.arange(2)
+    curvature = curvature.at[where, where].set(2.0 * count)
+    value = 0.5 * (jnp.sum(squares) + jnp.sum(found.log_variance))
+    return value, gradient.at[where].set(count - squares), curvature
 
 
 def rescale(point: Point, runs: Runs, law: Law) -> Point:

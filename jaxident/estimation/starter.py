@@ -147,17 +147,21 @@ def _products(channel: Channel, step: Array, pull: Array, rate: Array) -> Array:
 def _lay(rate: Array, step: Array, pull: Array, direction: Array) -> Array:
     """Coordinates (rows, windows, 1 + columns, coordinates) of paths laid along a direction per row (rows, windows, 1,
     coordinates): first of coasting from speed 1, then from rest under accelerations (rows, windows, columns)."""
-    holds = (jnp.broadcast_to(part, (*pull.shape[:2], 1)) for part in hold_integrals(rate, step))
+    even = jnp.ndim(step) == 0
+    shared = hold_integrals(rate, step)
     pull = jnp.concatenate([jnp.zeros_like(pull[..., :1]), pull], axis=-1)
 
     def body(now, row):
         speed, place = now
-        decay, once, twice, pull, direction = row
+        own, pull, direction = row
+        decay, once, twice = shared if even else own
         moved = place + (once * speed + twice * pull)[..., None] * direction
         return (decay * speed + once * pull, moved), place
 
     first = jnp.zeros(pull.shape[1:]).at[:, 0].set(1.0)
-    return jax.lax.scan(body, (first, jnp.zeros((*first.shape, direction.shape[-1]))), (*holds, pull, direction))[1]
+    return jax.lax.scan(
+        body, (first, jnp.zeros((*first.shape, direction.shape[-1]))), (None if even else shared, pull, direction)
+    )[1]
 
 
 def start_states(start: Start, windows: Runs) -> Array:

@@ -10,6 +10,7 @@ from jaxident.estimation.likelihood import Innovations, innovations, negative_lo
 from jaxident.estimation.parameters import Law, Robot, to_vector
 from jaxident.estimation.runs import Runs
 from jaxident.robot.drive import Force, Physical, hold
+from jaxident.robot.noise import Noise
 
 ROWS, STEP = 12, 0.05
 DRIVE = Physical(jnp.array([0.8, 5.0]), jnp.array([[0.3, 0.2], [4.0, -3.0]]))
@@ -27,8 +28,6 @@ def straight_run(memory):
 
 @pytest.mark.parametrize("memory", [None, 0.1])
 def test_likelihood_is_that_of_a_dense_gaussian(memory):
-    from jaxident.robot.noise import Noise
-
     run, numbers = straight_run(memory)
     noise = Noise(*(None if n is None else jnp.asarray(n) for n in numbers))
     pull = Force(jnp.full(ROWS, 0.7), jnp.zeros(ROWS))
@@ -61,8 +60,6 @@ def test_likelihood_is_that_of_a_dense_gaussian(memory):
 
 @pytest.mark.parametrize("memory", [False, True])
 def test_without_slip_the_filter_is_the_plain_fit(memory):
-    from jaxident.robot.noise import Noise
-
     run, _ = straight_run(None)
     rng = np.random.default_rng(1)
     run = run._replace(command=Wheels(*(jnp.asarray(u) for u in rng.uniform(-1.0, 1.0, (2, ROWS)))))

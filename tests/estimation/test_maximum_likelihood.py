@@ -1,5 +1,7 @@
 """Maximum likelihood: recovery, efficiency and coverage, several runs, gaps, uneven steps, batches, corners."""
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -13,7 +15,7 @@ from jaxident.estimation.noise_law import NOISE_LAWS
 from jaxident.estimation.parameters import Law, Robot, bounds, from_vector, names, to_vector
 from jaxident.estimation.precision import bound_covariance, natural_values
 from jaxident.estimation.runs import Runs, stack_runs
-from jaxident.estimation.scoring import Point, local_at
+from jaxident.estimation.scoring import Point, _general_local, _white_local, local_at
 from jaxident.log import Log, make_log
 from jaxident.robot.drive import Physical
 from jaxident.robot.excitation import EXCITATIONS
@@ -174,3 +176,13 @@ def test_vectors_come_back_as_the_robot():
     again = natural_values(from_vector(to_vector(robot, law), law), law)
     np.testing.assert_allclose(again, natural_values(robot, law), rtol=1e-12)
     assert len(again) == len(names(law)) == 15
+
+
+def test_white_shortcut_is_the_general_curvature():
+    runs = jax.tree.map(jnp.asarray, stack_runs(logged(6, Noise(1e-3, 1e-2), 60)))
+    run = jax.tree.map(lambda leaf: leaf[0] if jnp.ndim(leaf) else leaf, runs)
+    vector = to_vector(Robot(DRIVE, DEAD_ZONE, Noise(1e-3, 1e-2)), Law())
+    unknowns = jnp.concatenate([vector, 0.01 * jnp.ones(5)])
+    both = [jax.jit(partial(part, law=Law()))(unknowns, run) for part in (_white_local, _general_local)]
+    for a, b in zip(*both, strict=True):
+        np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9 * np.max(np.abs(b)))

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from estimation.test_maximum_likelihood import DEAD_ZONE, DRIVE, PERIOD, logged
 
+from jaxident.array_types import State
 from jaxident.errors import InputError
 from jaxident.estimation.precision import cramer_rao
 from jaxident.files.models import load_model
@@ -23,7 +24,6 @@ def test_bound_is_the_inverse_information_by_finite_differences():
 
     def poses(values):
         model = Model(PERIOD, Physical(values[:2], values[2:6].reshape(2, 2)), values[6:8])
-        from jaxident.array_types import State
 
         state = run_physical(model, log.command, jnp.asarray(PERIOD), State(*values[8:]))
         return np.concatenate([state.x / 1e-3, state.y / 1e-3, state.theta / 1e-2])
