@@ -22,6 +22,9 @@ LARGEST_DAMPING = 1e12
 FLAT = 1e-13
 TOLERANCE = 1e-7
 """Expected fall of -log p below which the search ends: a step of 4e-4 standard deviations."""
+KINK_STEP, KINK_TOLERANCE = 1e-2, 1e-4
+"""At a kink: steps of dead zones below this many standard deviations fail, and the rest promises less than this."""
+DEAD_ZONES = slice(6, 8)
 LONGEST_LOG_STEP, LONGEST_SHARE = 1.5, 0.25
 """A step changes a logarithm by at most this much, and a dead zone by this share of its bound."""
 
@@ -45,13 +48,12 @@ class Local(NamedTuple):
 
 
 class Search(NamedTuple):
-    """Where a search stands: its best point, the curvature there, the point to look at next and the fall of -log p that
-    it promises, damping, steps taken, whether it has arrived."""
+    """Where a search stands: its best point, the curvature there, the point to look at next, damping, steps taken,
+    whether it has arrived."""
 
     point: Point
     local: Local
     proposed: Point
-    promised: Any
     damping: Any
     steps: Any
     arrived: Any
@@ -144,19 +146,35 @@ def eliminate(local: Local, damping: Array, held: Array) -> tuple[Array, Array, 
     return shared - reduced[:, :-1], free * local.gradient.shared - reduced[:, -1], solved
 
 
-def propose(point: Point, local: Local, damping: Array, law: Law, low: Array, high: Array) -> tuple[Point, Array]:
-    """The damped step from a point, shortened where it is long and cut at the bounds, and the fall it promises."""
-    slope = local.gradient.shared
-    held = ((point.shared <= low) & (slope > 0.0)) | ((point.shared >= high) & (slope < 0.0))
+def newton(local: Local, damping: Array, held: Array) -> tuple[Array, Array, Array]:
+    """The step in the shared unknowns and the start states with some unknowns held, and the fall it promises."""
     shared, gradient, solved = eliminate(local, damping, held)
     step = -jnp.linalg.solve(shared, gradient)
     starts = -(solved[:, :, -1] + solved[:, :, :-1] @ step)
+    promised = -0.5 * (jnp.sum(step * local.gradient.shared) + jnp.sum(starts * local.gradient.starts))
+    return step, starts, promised
+
+
+def propose(point: Point, local: Local, damping: Array, law: Law, low: Array, high: Array) -> tuple[Point, Array]:
+    """The damped step from a point, shortened where it is long and cut at the bounds, and whether the point is a
+    minimum.
+
+    It is one where the whole step promises next to nothing, or at a kink: where a dead zone meets a level of the
+    commands the cost has two slopes. Both may point up, so that ever smaller steps of the dead zone fail while all
+    other unknowns are at rest.
+    """
+    slope = local.gradient.shared
+    held = ((point.shared <= low) & (slope > 0.0)) | ((point.shared >= high) & (slope < 0.0))
+    step, starts, promised = newton(local, damping, held)
     longest = jnp.where(is_logarithmic(law), LONGEST_LOG_STEP, jnp.inf)
-    longest = longest.at[6:8].set(LONGEST_SHARE * high[6:8])
+    longest = longest.at[DEAD_ZONES].set(LONGEST_SHARE * high[DEAD_ZONES])
     part = jnp.minimum(1.0, jnp.min(longest / jnp.maximum(jnp.abs(step), 1e-300)))
-    promised = -0.5 * (jnp.sum(step * slope) + jnp.sum(starts * local.gradient.starts))
     moved = jnp.clip(point.shared + part * step, low, high)
-    return Point(moved, point.starts + part * starts), promised
+    level = (promised >= 0.0) & (promised < TOLERANCE) & (damping <= FIRST_DAMPING)
+    _, _, others = newton(local, jnp.asarray(1e-9), held.at[DEAD_ZONES].set(True))
+    tiny = jnp.abs(step) * jnp.sqrt(jnp.diagonal(local.shared)) < KINK_STEP
+    kink = (others >= 0.0) & (others < KINK_TOLERANCE) & jnp.all(tiny[DEAD_ZONES])
+    return Point(moved, point.starts + part * starts), level | kink
 
 
 def search_from(point: Point, runs: Runs, law: Law, d_max: Array, most: int) -> Search:
@@ -169,9 +187,8 @@ def search_from(point: Point, runs: Runs, law: Law, d_max: Array, most: int) -> 
         better = (local.value <= search.local.value) | (search.steps == 0)
         point, local = jax.tree.map(lambda a, b: jnp.where(better, a, b), (there, local), (search.point, search.local))
         damping = jnp.maximum(search.damping * jnp.where(better, EASE, STIFFEN), 1e-9)
-        proposed, promised = propose(point, local, damping, law, low, high)
-        arrived = (promised >= 0.0) & (promised < TOLERANCE) & (damping <= FIRST_DAMPING)
-        return Search(point, local, proposed, promised, damping, search.steps + 1, arrived)
+        proposed, arrived = propose(point, local, damping, law, low, high)
+        return Search(point, local, proposed, damping, search.steps + 1, arrived)
 
     def walking(search):
         return ~search.arrived & (search.steps < most) & (search.damping < LARGEST_DAMPING)
@@ -185,7 +202,7 @@ def search_from(point: Point, runs: Runs, law: Law, d_max: Array, most: int) -> 
         jnp.zeros((runs_count, START_STATES, START_STATES)),
         jnp.zeros((runs_count, unknown, START_STATES)),
     )
-    first = Search(point, nothing, point, inf, jnp.asarray(FIRST_DAMPING), jnp.asarray(0), jnp.asarray(False))
+    first = Search(point, nothing, point, jnp.asarray(FIRST_DAMPING), jnp.asarray(0), jnp.asarray(False))
     return jax.lax.while_loop(walking, body, first)
 
 

@@ -48,7 +48,8 @@ def test_difference_deviations_follow_from_the_physical_ones():
         difference_vector(Model(PERIOD, DRIVE._replace(rate=moved), DEAD_ZONE).difference, DEAD_ZONE)
         - difference_vector(ROBOT.difference, DEAD_ZONE)
     ) / (DRIVE.rate[0] * 1e-6)
-    assert bound.difference_deviation[0] == pytest.approx(abs(float(slope[0])) * bound.standard_deviation[0], rel=1e-4)
+    expected = abs(float(slope[0])) * float(bound.standard_deviation[0])
+    assert float(bound.difference_deviation[0]) == pytest.approx(expected, rel=1e-4)
     np.testing.assert_allclose(bound.difference_deviation[10:], bound.standard_deviation[6:8], rtol=1e-9)
 
 
