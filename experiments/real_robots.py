@@ -46,7 +46,7 @@ def commanded(log: Log, prediction, track: float, wheel: float = 1.0):
 
 def judge(name: str, known: Log, unseen: Log, horizon: int, burn_in: int, baseline, out: pathlib.Path) -> dict:
     """Identify on one part, predict the other, draw, and return the row of the table."""
-    found = ji.identify(known)
+    found = ji.identify(known, "paper")
     prediction = ji.predict(found.model, unseen, horizon, burn_in=burn_in)
     ours, told = prediction_error(prediction, unseen), prediction_error(baseline(unseen, prediction), unseen)
     draw(name, unseen, prediction, f"{ours['position_median']:.2g} m off after {ours['seconds']:.2g} s (median)", out)

@@ -32,6 +32,7 @@ _HOMES = {
     "path_length": "jaxident.robot.path_length",
     "EXCITATIONS": "jaxident.robot.excitation",
     "identify": "jaxident.estimation.identify",
+    "cramer_rao": "jaxident.estimation.precision",
     "predict": "jaxident.estimation.predict",
     "read_log": "jaxident.files.logs",
     "write_log": "jaxident.files.logs",

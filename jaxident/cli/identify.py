@@ -8,35 +8,34 @@ from jaxident.cli.progress import working
 from jaxident.cli.session import json_option, table, write_json, wrote
 from jaxident.start import start_jax
 
-NOTE = (
-    "Intervals take the equation error for white. Camera noise makes it coloured and biases these estimates: "
-    "see the README, 'What the paper's method can and cannot do'."
-)
+NOTES = {
+    "paper": "Intervals take the equation error for white. Camera noise makes it coloured and biases these estimates: "
+    "see the README, 'What the paper's method can and cannot do'.",
+    "maximum-likelihood": "Intervals hold under the noise law above; all poses were used, start states estimated.",
+}
 
 
 @click.command()
 @click.argument("logs", nargs=-1, required=True, metavar="LOG...")
-@click.option("--method", type=click.Choice(["paper"]), default="paper", show_default=True)
 @click.option(
-    "--setup-time", type=click.FloatRange(0, min_open=True), metavar="S", help="Seconds for the start values."
+    "--method", type=click.Choice(["maximum-likelihood", "paper"]), default="maximum-likelihood", show_default=True
 )
 @click.option(
-    "--forgetting", type=float, default=1.0, show_default=True, metavar="F", help="In (0, 1]; 1 forgets nothing."
+    "--setup-time", type=click.FloatRange(0, min_open=True), metavar="S", help="Seconds for the start values (paper)."
 )
+@click.option("--forgetting", type=float, metavar="F", help="In (0, 1]; 1, the default, forgets nothing.")
 @click.option("--d-max", type=float, metavar="D", help="Largest dead zone (default: 0.9 of the largest command).")
 @click.option(
     "--reading",
     type=click.Choice(["free-run", "one-step"]),
-    default="one-step",
-    show_default=True,
-    help="How the cost of the start values reads the paper's (21).",
+    help="How the cost of the start values reads the paper's (21); one-step by default (paper).",
 )
 @click.option("--out", metavar="MODEL", help="The model file to write.")
 @json_option
 def command(logs, method, setup_time, forgetting, d_max, reading, out, json_file):
     """The model behind one or several logs (files, folders, or `-`), runs in the order given.
 
-    Example: jaxident identify log.csv --method paper --out model.json
+    Example: jaxident identify log.csv --out model.json
     """
     start_jax()
     import jaxident
@@ -49,15 +48,15 @@ def command(logs, method, setup_time, forgetting, d_max, reading, out, json_file
     records = read_logs(logs)
     settings = {"setup_time": setup_time, "forgetting": forgetting, "d_max": d_max}
     with working("identifying"):
-        found = identify(records, method, reading=reading.replace("-", "_"), **settings)
+        found = identify(records, method, reading=reading and reading.replace("-", "_"), **settings)
     origin = Provenance(jaxident.__version__, method, tuple(logs))
     model = dataclasses.replace(found.model, provenance=origin)
     rows = verdicts(model, max(float(abs(u).max()) for record in records for u in record.command))
     click.echo(table([("parameter", "estimate", "95 % interval", "this input"), *(row.cells() for row in rows)]))
-    click.echo(NOTE)
+    click.echo(NOTES[method])
     if not bool(found.ok):
         click.echo(
-            "warning: the batch fit on the setup time did not converge; the recursion started from it all the same",
+            "warning: the fit did not converge: do not trust these numbers before you have looked at the log",
             err=True,
         )
     if out:

@@ -8,17 +8,20 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxident.array_types import Array, Increment, Wheels
+from jaxident.array_types import Array, Increment, Pose, Wheels
 from jaxident.errors import InputError, WorkError
 from jaxident.estimation import recursive
 from jaxident.estimation.checks import check_informative
+from jaxident.estimation.identify_poses import identify_poses
 from jaxident.estimation.initialise import Setup, initialise
 from jaxident.estimation.least_squares import full_covariance
+from jaxident.estimation.maximum_likelihood import Fit
 from jaxident.estimation.observations import observe_log
 from jaxident.log import Log, even_period, join
 from jaxident.numerics import require_float64
 from jaxident.robot.model import DIFFERENCE_ORDER, Model, Provenance, Spread, difference_vector
 
+METHODS = ("maximum-likelihood", "paper")
 SETUP_SAMPLES = 200
 SETUP_SHARE = 0.3
 SMALLEST_LOG = 20
@@ -35,49 +38,71 @@ class History(NamedTuple):
 
 
 class Identification(NamedTuple):
-    """A model, the covariance of its parameters in `model.parameter_order`, one-step residuals [m], [rad] (samples,)
-    with NaN where a sample was not used, and how the estimate came about. ok: every stage converged."""
+    """A model, the covariance of its parameters in `model.parameter_order`, residuals with NaN where there is none, and
+    whether every stage converged.
+
+    By maximum likelihood: residuals a `Pose` [m], [rad] (rows,), and the fit. By the paper: one-step residuals an
+    `Increment` [m], [rad] (samples,), and how the recursion came about.
+    """
 
     model: Model
     covariance: Any
-    residuals: Increment
-    setup: Setup
-    history: History
+    residuals: Pose | Increment
     ok: Any
+    fit: Fit | None = None
+    setup: Any = None
+    history: Any = None
 
 
 def identify(
     logs: Log | Sequence[Log],
-    method: str = "paper",
+    method: str = "maximum-likelihood",
     *,
+    noise_law: str = "auto",
+    coupling: bool = False,
     setup_time: float | None = None,
-    forgetting: float = 1.0,
+    forgetting: float | None = None,
     d_max: float | None = None,
-    reading: str = "one_step",
+    reading: str | None = None,
 ) -> Identification:
     """The model of the robot behind one or several logs, runs in the order given.
 
-    method "paper": batch initialisation on the setup time (section VI), then recursive least squares (15)-(18) over
-    the rest. setup_time [s] counts from the start (default: 200 samples or three tenths, whichever is more); forgetting
-    in (0, 1]; d_max bounds the dead zones [unit of the command] (default: 0.9 of the largest command); reading of
-    (21): "one_step", as the recursion reads it and best on real robots, or "free_run". Needs double precision and an
-    even log; InputError says what a log lacks, WorkError that the result is not finite.
+    method "maximum-likelihood": physical parameters from whole runs, uneven or not, under a noise_law "white", "ar1",
+    "slip", "slip-ar1" or "auto"; with `coupling` of the two speeds if asked for. method "paper": batch initialisation
+    on the setup time (section VI), then recursive least squares (15)-(18) over the rest of an even log. Its settings:
+    setup_time [s] from the start (default: 200 samples or three tenths, whichever is more); forgetting in (0, 1]
+    (default 1); reading of (21): "one_step" (default), as the recursion reads it and best on real robots, or
+    "free_run". d_max bounds the dead zones [unit of the command] (default: 0.9 of the largest command). Needs double
+    precision; InputError says what a log lacks, WorkError that the result is not finite.
     """
     require_float64("identify")
-    if method != "paper":
-        raise InputError(f"method {method!r}: this version knows 'paper'")
+    if method not in METHODS:
+        raise InputError(f"method {method!r}: choose from {', '.join(METHODS)}")
     log = join(logs)
     check_informative(log)
-    period = even_period(log)
-    largest = float(np.max(np.abs(np.stack(log.command))))
+    largest = float(np.nanmax(np.abs(np.stack(log.command))))
     d_max = D_MAX_SHARE * largest if d_max is None else d_max
-    check_settings(forgetting, d_max, largest)
+    check_settings(1.0 if forgetting is None else forgetting, d_max, largest)
+    if method == "paper":
+        settings = setup_time, 1.0 if forgetting is None else forgetting, reading or "one_step"
+        return _identify_as_paper(log, d_max, *settings)
+    given = {"setup time": setup_time, "forgetting": forgetting, "reading": reading}
+    for name in [name for name, value in given.items() if value is not None]:
+        raise InputError(f"{name}: a setting of the method 'paper'; maximum likelihood has none such")
+    found = identify_poses(log, d_max, noise_law, coupling)
+    return Identification(found.model, found.model.covariance, found.residuals, found.fit.ok, fit=found.fit)
+
+
+def _identify_as_paper(
+    log: Log, d_max: float, setup_time: float | None, forgetting: float, reading: str
+) -> Identification:
+    period = even_period(log)
     setup_rows = count_setup_rows(log, period, setup_time)
     estimate, setup, history, residuals, covariance = identify_recursively(
         Log(*(jnp.asarray(column) for column in log)), setup_rows, d_max, forgetting, reading
     )
-    model = _model(estimate, covariance, period, method)
-    return Identification(model, covariance, residuals, setup, history, setup.ok)
+    model = _model(estimate, covariance, period, "paper")
+    return Identification(model, covariance, residuals, setup.ok, setup=setup, history=history)
 
 
 def _model(estimate: recursive.Estimate, covariance: Array, period: float, method: str) -> Model:

@@ -186,7 +186,7 @@ def drift_study(robot: Model, log: Log) -> list[Drift]:
 
 
 def _follow(log: Log, name: str, truth: Array) -> Drift:
-    found = identify(log, forgetting=FORGETTING, reading="one_step")
+    found = identify(log, "paper", forgetting=FORGETTING, reading="one_step")
     column = DIFFERENCE_ORDER.index(name)
     late = slice(len(log.t) - len(found.history.parameters), None)
     return Drift(
@@ -207,7 +207,7 @@ def reproduce(robot: Model, reference: Model, *, seed: int = 0, seeds: int = 200
     log = paper_log(robot, key_input)
     with ThreadPoolExecutor() as both:  # most of the time is compilation, which runs side by side
         noise = both.submit(noise_study, jax.tree.map(jnp.asarray, log), key_noise, jnp.array(NOISE_LEVELS), seeds)
-        found = identify(log, reading="one_step")
+        found = identify(log, "paper", reading="one_step")
         drifts = drift_study(robot, log)
         modelled = Log(*(np.asarray(column) for column in simulate(found.model, log)))
         prediction = predict(found.model, log, PREDICTED_ROWS)

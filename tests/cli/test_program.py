@@ -25,8 +25,8 @@ def folder(tmp_path_factory):
     made = jaxident("simulate", "published", "--excitation", "staircase", "--samples", 600, "--hold", 5,
                     "--noise", "1e-6,1e-5", "--out", folder / "log.csv")  # fmt: skip
     assert made.returncode == 0, made.stderr
-    found = jaxident("identify", folder / "log.csv", "--reading", "one-step", "--out", folder / "model.json",
-                     "--json", folder / "result.json")  # fmt: skip
+    found = jaxident("identify", folder / "log.csv", "--method", "paper", "--reading", "one-step", "--out",
+                     folder / "model.json", "--json", folder / "result.json")  # fmt: skip
     assert found.returncode == 0, found.stderr
     assert "dead_zone_r" in found.stdout
     assert "wrote" in found.stdout
@@ -86,7 +86,7 @@ def test_wrong_use(folder):
     refused(jaxident("idntify", log), "No such command 'idntify'")
     refused(jaxident("identify"), "LOG...")
     refused(jaxident("identify", folder / "none.csv"), "none.csv")
-    refused(jaxident("identify", log, "--forgetting", 1.5), "forgetting 1.5")
+    refused(jaxident("identify", log, "--method", "paper", "--forgetting", 1.5), "forgetting 1.5")
     refused(jaxident("identify", log, "--d-max", 7), "d-max 7")
     refused(jaxident("simulate", "published", "--out", "x.csv", cwd=folder), "--inputs LOG or --excitation NAME")
     refused(jaxident("predict", folder / "model.json", log, "--horizon", 5000, "--burn-in", 900, "--out", "x.csv",

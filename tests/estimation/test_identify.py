@@ -39,7 +39,7 @@ def log():
 
 
 def test_noise_free_data_are_recovered(log):
-    found = identify(log)
+    found = identify(log, "paper")
     assert found.ok
     np.testing.assert_allclose(vector(found), TRUTH, rtol=1e-3)
 
@@ -51,13 +51,13 @@ def test_several_logs_are_runs_and_poses_may_be_missing():
     gaps = first._replace(
         x=x, y=np.where(np.isnan(x), np.nan, first.y), theta=np.where(np.isnan(x), np.nan, first.theta)
     )
-    found = identify([gaps, second], reading="free_run")
+    found = identify([gaps, second], "paper", reading="free_run")
     assert found.ok
     np.testing.assert_allclose(vector(found), TRUTH, rtol=1e-3)
 
 
 def test_covariance_is_symmetric_and_tells_every_deviation():
-    found = identify(made(3, noise=1e-5))
+    found = identify(made(3, noise=1e-5), "paper")
     assert found.covariance.shape == (12, 12)
     np.testing.assert_allclose(found.covariance, np.asarray(found.covariance).T, rtol=1e-9)
     spread = found.model.standard_deviation
@@ -82,7 +82,7 @@ def test_covariance_is_symmetric_and_tells_every_deviation():
 )
 def test_wrong_settings_are_named(log, settings, words):
     with pytest.raises(InputError, match=words):
-        identify(log, **settings)
+        identify(log, **{"method": "paper", **settings})
 
 
 def test_logs_that_cannot_be_identified_say_why(log):
@@ -94,7 +94,7 @@ def test_logs_that_cannot_be_identified_say_why(log):
         (log._replace(t=log.t + 0.01 * (np.arange(ROWS) > 200)), "uneven"),
     ):
         with pytest.raises(InputError, match=words):
-            identify(bad)
+            identify(bad, "paper")
 
 
 def test_batches_over_seeds_and_excitations_are_the_loop_compiled_once():

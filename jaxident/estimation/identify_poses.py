@@ -1,0 +1,84 @@
+"""From logs to a model by maximum likelihood on poses."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxident.array_types import Pose
+from jaxident.errors import InputError, WorkError
+from jaxident.estimation.maximum_likelihood import Fit
+from jaxident.estimation.noise_law import fit_law
+from jaxident.estimation.parameters import Law, names, to_vector
+from jaxident.estimation.precision import difference_covariance, spread_of
+from jaxident.estimation.runs import Runs, stack_runs
+from jaxident.log import Log
+from jaxident.robot.drive import Physical
+from jaxident.robot.model import Model, Provenance
+
+SMALLEST_LOG = 20
+
+
+class PoseFit(NamedTuple):
+    """A model, the residuals [m], [m], [rad] (rows,) of the log, NaN where no pose was, the fit and its law."""
+
+    model: Model
+    residuals: Pose
+    fit: Fit
+    law: Law
+
+
+def identify_poses(log: Log, d_max: float, noise_law: str, coupling: bool) -> PoseFit:
+    """The model behind a joined log with any number of runs, steps of any length, poses missing or not.
+
+    Residuals are pose minus model pose, with slip or a memory of the camera error the prediction error of the next
+    pose. InputError for a log that is too short, WorkError where nothing finite came out.
+    """
+    measured = int(np.sum(np.isfinite(log.x) & np.isfinite(log.y) & np.isfinite(log.theta)))
+    if measured < SMALLEST_LOG:
+        raise InputError(f"{len(log.t)} rows, {measured} with a pose: maximum likelihood needs at least {SMALLEST_LOG}")
+    log = _with_commands(log)
+    runs = stack_runs(log)
+    fit, law = fit_law(jax.tree.map(jnp.asarray, runs), jnp.asarray(d_max), noise_law, coupling)
+    if not all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves((fit.robot, fit.covariance))):
+        raise WorkError("the maximum-likelihood estimate is not finite: the log does not determine the model")
+    return PoseFit(_model(fit, law, float(np.median(_steps(log)))), _residuals(fit, runs, log), fit, law)
+
+
+def _with_commands(log: Log) -> Log:
+    """The log, its missing commands checked: only the last row of a run may lack them."""
+    for number, run in enumerate(log.runs()):
+        holes = ~np.isfinite(np.stack(run.command)).all(axis=0)[:-1]
+        if holes.any():
+            raise InputError(f"run {number}: no command at t = {run.t[np.argmax(holes)]:g} s")
+    return log
+
+
+def _steps(log: Log) -> np.ndarray:
+    return np.concatenate([np.diff(run.t) for run in log.runs()])
+
+
+def _model(fit: Fit, law: Law, period: float) -> Model:
+    """The estimate as a model with its noise law, covariance and standard deviations."""
+    difference = difference_covariance(to_vector(fit.robot, law), fit.covariance, period, law)
+    drive, noise = fit.robot.drive, fit.robot.noise
+    coupling = None if drive.coupling is None else np.asarray(drive.coupling)
+    return Model(
+        period,
+        Physical(np.asarray(drive.rate), np.asarray(drive.gain), coupling),
+        np.asarray(fit.robot.dead_zone),
+        noise=noise._replace(**{name: float(v) for name, v in noise._asdict().items() if v is not None}),
+        standard_deviation=spread_of(fit.covariance, difference, law),
+        covariance=fit.covariance,
+        parameter_order=names(law),
+        provenance=Provenance(method="maximum-likelihood"),
+    )
+
+
+def _residuals(fit: Fit, runs: Runs, log: Log) -> Pose:
+    """Innovations in the units of the pose, row by row of the log."""
+    values: Any = np.asarray(fit.innovations.normalised * jnp.exp(0.5 * fit.innovations.log_variance))
+    values = np.where(np.asarray(runs.seen)[:, None], values, np.nan)
+    lengths = [len(run.t) for run in log.runs()]
+    return Pose(*(np.concatenate([v[k, :n] for v, n in zip(values, lengths, strict=True)]) for k in range(3)))

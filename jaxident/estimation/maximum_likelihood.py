@@ -1,0 +1,101 @@
+"""Maximum likelihood on camera poses: whole runs, several at once, under one of several noise laws."""
+
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxident.array_types import Array
+from jaxident.estimation.likelihood import Innovations, innovations
+from jaxident.estimation.parameters import Law, Robot, from_vector, to_vector
+from jaxident.estimation.runs import Runs, cut_windows, run_axes
+from jaxident.estimation.scoring import Point, Search, covariance_at, search_from
+from jaxident.estimation.starter import Start, first_estimate, start_states
+from jaxident.robot.drive import Physical
+from jaxident.robot.noise import Noise
+
+WINDOW = 200
+"""Rows of the windows that the starter fits: long enough for a slow pole, too short for slip to pile up."""
+MOST_STEPS = 40
+WHITE = Law()
+
+
+class Fit(NamedTuple):
+    """A maximum-likelihood estimate.
+
+    robot: drive, dead zones and noise law. starts (runs, 5): states x, y, theta, v, w at the first row of each run.
+    covariance (unknowns, unknowns) in the order of `parameters.names(law)`, natural units. log_likelihood: of the
+    measured poses. innovations (runs, 3, rows): normalised, and their log variances. ok: the search arrived, everything
+    is finite, and there are more numbers than unknowns. steps: of the search.
+    """
+
+    robot: Robot
+    starts: Any
+    covariance: Any
+    log_likelihood: Any
+    innovations: Innovations
+    ok: Any
+    steps: Any
+
+
+class Beginning(NamedTuple):
+    """Where searches begin, whatever the law: the starter's estimate, and states (runs, 5) at each run's first row."""
+
+    estimate: Start
+    starts: Any
+
+
+@partial(jax.jit, static_argnames=("window",))
+def begin(runs: Runs, d_max: Array, window: int = WINDOW) -> Beginning:
+    """The starter's estimate on windows of some rows of the runs (runs, rows)."""
+    windows = cut_windows(runs, min(window, runs.seen.shape[1]))
+    estimate = first_estimate(windows, d_max)
+    per_run = windows.seen.shape[0] // runs.seen.shape[0]
+    first = jax.tree.map(lambda leaf: leaf[::per_run] if jnp.ndim(leaf) else leaf, windows)
+    return Beginning(estimate, start_states(estimate, first))
+
+
+def first_point(beginning: Beginning, step: Array, law: Law) -> Point:
+    """The point of a beginning under a law: residuals as camera noise, a memory of two steps [s], slip that adds a
+    tenth of the residual per step."""
+    estimate, starts = beginning
+    position, heading = jnp.maximum(estimate.residual, 1e-9)
+    slip = 0.1 / jnp.mean(step) ** 1.5
+    noise = Noise(position, heading, 2.0 * jnp.mean(step), slip * position, slip * heading)
+    drive = Physical(estimate.rate, estimate.gain, jnp.zeros(2) if law.coupling else None)
+    return Point(to_vector(Robot(drive, estimate.dead_zone, noise), law), starts)
+
+
+def fit_runs(runs: Runs, d_max: Array, law: Law = WHITE, window: int = WINDOW) -> Fit:
+    """The estimate from runs (runs, rows) under a law, from the data alone; pure, maps over trials.
+
+    d_max: largest dead zone [unit of the command]. A fit that fails comes back finite where it stopped, ok False.
+    """
+    return fit_from(begin(runs, d_max, window), runs, d_max, law)
+
+
+@partial(jax.jit, static_argnames=("law",))
+def fit_from(beginning: Beginning, runs: Runs, d_max: Array, law: Law) -> Fit:
+    """The estimate by a search from a given beginning."""
+    search = search_from(first_point(beginning, runs.step, law), runs, law, d_max, MOST_STEPS)
+    covariance = covariance_at(search.point, search.local, law)
+    found = jax.vmap(lambda start, run: innovations(search.point.shared, start, run, law), in_axes=(0, run_axes(runs)))(
+        search.point.starts, runs
+    )
+    return Fit(
+        robot=from_vector(search.point.shared, law),
+        starts=search.point.starts,
+        covariance=covariance,
+        log_likelihood=-search.local.value - 1.5 * jnp.sum(runs.seen) * jnp.log(2.0 * jnp.pi),
+        innovations=found,
+        ok=search.arrived & _regular(search, covariance, runs),
+        steps=search.steps,
+    )
+
+
+def _regular(search: Search, covariance: Array, runs: Runs) -> Array:
+    """Whether everything is finite and there are more numbers than unknowns."""
+    finite = [jnp.all(jnp.isfinite(part)) for part in (*search.point, search.local.value, covariance)]
+    unknowns = search.point.shared.size + search.point.starts.size
+    return jnp.all(jnp.stack(finite)) & (3 * jnp.sum(runs.seen) > unknowns)

@@ -1,0 +1,63 @@
+"""Which noise law the data ask for: white camera error where the residuals are white, else the likeliest law."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxident.array_types import Array
+from jaxident.errors import InputError
+from jaxident.estimation.maximum_likelihood import Fit, begin, fit_from
+from jaxident.estimation.parameters import Law, names
+from jaxident.estimation.runs import Runs
+
+NOISE_LAWS = {
+    "white": Law(),
+    "ar1": Law(memory=True),
+    "slip": Law(slip=True),
+    "slip-ar1": Law(memory=True, slip=True),
+}
+"""White camera error; with a memory; white and random slip; both."""
+
+LAGS = (1, 2, 4, 8, 16)
+WHITE = 30.6
+"""Largest sum of squared residual correlations, 15 of them, of white residuals: chi-squared, 1 in 100."""
+
+
+def fit_law(runs: Runs, d_max: Array, noise_law: str, coupling: bool) -> tuple[Fit, Law]:
+    """The fit under a named law, or under the one that "auto" finds.
+
+    "auto" keeps white camera error if the residuals of that fit are white; otherwise it adds a memory or slip, and
+    where that leaves them coloured too, both. Of what it has tried it takes the lowest Bayesian information criterion
+    (Schwarz 1978).
+    """
+    if noise_law not in (*NOISE_LAWS, "auto"):
+        raise InputError(f"noise law {noise_law!r}: choose from {', '.join((*NOISE_LAWS, 'auto'))}")
+    beginning = begin(runs, d_max)
+    tried: list[tuple[Fit, Law]] = []
+    for laws in (("white",), ("ar1", "slip"), ("slip-ar1",)) if noise_law == "auto" else ((noise_law,),):
+        for law in (NOISE_LAWS[name]._replace(coupling=coupling) for name in laws):
+            tried.append((fit_from(beginning, runs, d_max, law), law))
+        fit, law = min(tried, key=lambda pair: criterion(pair[0], pair[1], 3 * int(np.sum(runs.seen))))
+        if bool(fit.ok) and float(whiteness(fit.innovations.normalised, runs.seen)) < WHITE:
+            break
+    return fit, law
+
+
+def criterion(fit: Fit, law: Law, count: int) -> float:
+    """Bayesian information criterion of a fit to `count` numbers; infinite where the fit failed."""
+    value = -2.0 * float(fit.log_likelihood) + len(names(law)) * np.log(count)
+    return value if bool(fit.ok) and np.isfinite(value) else np.inf
+
+
+@jax.jit
+def whiteness(normalised: Array, seen: Array) -> Array:
+    """Sum over three channels and LAGS of n r^2, r the correlation of innovations (runs, 3, rows) at a lag: about
+    chi-squared with 15 degrees of freedom for white ones (Box and Pierce 1970)."""
+    total = jnp.zeros(())
+    for lag in LAGS:
+        both = (seen[:, lag:] & seen[:, :-lag])[:, None]
+        product = jnp.where(both, normalised[..., lag:] * normalised[..., :-lag], 0.0)
+        pairs = jnp.maximum(jnp.sum(both), 1)
+        power = jnp.sum(normalised**2, axis=(0, 2)) / jnp.maximum(jnp.sum(seen), 1)
+        total = total + jnp.sum((jnp.sum(product, axis=(0, 2)) / power) ** 2) / pairs
+    return total

@@ -1,0 +1,103 @@
+"""The unknowns of the likelihood as one vector, and the noise law that says which of them there are."""
+
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+
+from jaxident.array_types import Array
+from jaxident.robot.drive import Physical
+from jaxident.robot.noise import Noise
+
+
+class Law(NamedTuple):
+    """Which terms the model has: coupling of the two speeds, camera error with a memory (AR(1)), random slip."""
+
+    coupling: bool = False
+    memory: bool = False
+    slip: bool = False
+
+
+class Robot(NamedTuple):
+    """What a vector of unknowns stands for: drive, dead zones (2,) and noise law."""
+
+    drive: Physical
+    dead_zone: Any
+    noise: Noise
+
+
+NAMES = (
+    "rate_1", "rate_2", "gain_11", "gain_12", "gain_21", "gain_22", "dead_zone_r", "dead_zone_l",
+    "coupling_1", "coupling_2", "position", "heading", "correlation_time", "slip_along", "slip_heading",
+)  # fmt: skip
+"""All unknowns in the order of the vector; a law keeps some of them."""
+
+_LOGARITHMIC = ("rate_1", "rate_2", *NAMES[10:])
+_LOWEST = {"rate": 1e-4, "position": 1e-9, "heading": 1e-9, "correlation_time": 1e-4, "slip_along": 1e-7,
+           "slip_heading": 1e-7}  # fmt: skip
+_HIGHEST = {"rate": 1e3, "position": 1e3, "heading": 1e2, "correlation_time": 1e3, "slip_along": 1e3,
+            "slip_heading": 1e3}  # fmt: skip
+
+
+def names(law: Law) -> tuple[str, ...]:
+    """The unknowns that a law has, in the order of its vector."""
+    left_out = (
+        (() if law.coupling else ("coupling_1", "coupling_2"))
+        + (() if law.memory else ("correlation_time",))
+        + (() if law.slip else ("slip_along", "slip_heading"))
+    )
+    return tuple(name for name in NAMES if name not in left_out)
+
+
+def is_logarithmic(law: Law) -> Array:
+    """Boolean (unknowns,): which unknowns stand in the vector as their logarithm."""
+    return jnp.array([name in _LOGARITHMIC for name in names(law)])
+
+
+def to_vector(robot: Robot, law: Law) -> Array:
+    """The vector (unknowns,) of a robot; terms that the law has not are left out."""
+    coupling = (0.0, 0.0) if robot.drive.coupling is None else robot.drive.coupling
+    noise = robot.noise
+    time = 1.0 if noise.correlation_time is None else noise.correlation_time
+    values = [
+        *jnp.log(jnp.asarray(robot.drive.rate)), *jnp.ravel(jnp.asarray(robot.drive.gain)),
+        *jnp.asarray(robot.dead_zone), *jnp.asarray(coupling),
+        *jnp.log(jnp.stack([jnp.asarray(v) for v in (noise.position, noise.heading, time)])),
+        *jnp.log(jnp.maximum(jnp.stack([jnp.asarray(v) for v in (noise.slip_along, noise.slip_heading)]), 1e-300)),
+    ]  # fmt: skip
+    kept = names(law)
+    low, high = bounds(law, jnp.inf)
+    return jnp.clip(jnp.stack([v for name, v in zip(NAMES, values, strict=True) if name in kept]), low, high)
+
+
+def from_vector(vector: Array, law: Law) -> Robot:
+    """The robot of a vector (unknowns,)."""
+    found = dict(zip(names(law), vector, strict=True))
+    value = {name: jnp.exp(v) if name in _LOGARITHMIC else v for name, v in found.items()}
+    drive = Physical(
+        (value["rate_1"], value["rate_2"]),
+        ((value["gain_11"], value["gain_12"]), (value["gain_21"], value["gain_22"])),
+        (value["coupling_1"], value["coupling_2"]) if law.coupling else None,
+    )
+    noise = Noise(
+        value["position"],
+        value["heading"],
+        value.get("correlation_time"),
+        value.get("slip_along", 0.0),
+        value.get("slip_heading", 0.0),
+    )
+    return Robot(drive, (value["dead_zone_r"], value["dead_zone_l"]), noise)
+
+
+def bounds(law: Law, d_max: Array) -> tuple[Array, Array]:
+    """Lowest and highest vector (unknowns,) that a search may visit; dead zones end at d_max."""
+
+    def limits(table: dict[str, float], free: float, dead_zone: Array) -> Array:
+        def limit(name: str) -> Array:
+            if name.startswith("dead_zone"):
+                return jnp.asarray(dead_zone, float)
+            value = table.get(name.removesuffix("_1").removesuffix("_2"))
+            return jnp.asarray(free if value is None else jnp.log(value))
+
+        return jnp.stack([limit(name) for name in names(law)])
+
+    return limits(_LOWEST, -jnp.inf, 0.0), limits(_HIGHEST, jnp.inf, d_max)

@@ -1,0 +1,128 @@
+"""How well parameters can be known: Fisher information, the Cramer-Rao bound, and standard deviations from either."""
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxident.array_types import AT_REST, Array, Pose, State
+from jaxident.errors import InputError
+from jaxident.estimation.parameters import Law, Robot, from_vector, names, to_vector
+from jaxident.estimation.runs import Runs, run_axes, stack_runs
+from jaxident.estimation.scoring import Point, covariance_at, local_at
+from jaxident.estimation.verdict import Verdict, verdicts_of
+from jaxident.log import Log, join
+from jaxident.numerics import require_float64
+from jaxident.robot.difference import to_difference
+from jaxident.robot.drive import Physical
+from jaxident.robot.model import DIFFERENCE_ORDER, Model, Spread, difference_vector, require_physical
+from jaxident.robot.noise import Noise
+from jaxident.robot.simulate import run_physical
+
+
+class Bound(NamedTuple):
+    """The Cramer-Rao bound: no unbiased estimator does better.
+
+    order: names of the physical parameters and the noise law. covariance (n, n) and standard_deviation (n,) in that
+    order; difference_covariance (12, 12) and difference_deviation (12,) in DIFFERENCE_ORDER, to first order. verdicts:
+    one per physical parameter.
+    """
+
+    order: tuple[str, ...]
+    covariance: Any
+    standard_deviation: Any
+    difference_order: tuple[str, ...]
+    difference_covariance: Any
+    difference_deviation: Any
+    verdicts: list[Verdict]
+
+
+def cramer_rao(model: Model, inputs: Log | Sequence[Log], noise: Noise, *, start: State = AT_REST) -> Bound:
+    """The bound for `model` under the commands and times of `inputs` with camera and slip `noise`.
+
+    The inverse of the Fisher information by automatic differentiation of the simulator, five start states per run and
+    the noise law counted as unknowns. Rows without a pose count as not measured, unless no row has one. With slip the
+    information is that of the innovations along the path without it. InputError for a model without physical
+    parameters or a camera without noise. Needs double precision.
+    """
+    require_float64("cramer_rao")
+    drive = require_physical(model)
+    if not (float(noise.position) > 0.0 and float(noise.heading) > 0.0):
+        raise InputError("noise: position and heading must be above 0; without noise there is no bound")
+    law = law_of(drive, noise)
+    log = Log(*(np.asarray(column) for column in join(inputs)))
+    runs = stack_runs(log)
+    runs = runs if runs.seen.any() else runs._replace(seen=stack_runs(log._replace(x=log.t, y=log.t, theta=log.t)).seen)
+    vector = to_vector(Robot(drive, model.dead_zone, noise), law)
+    covariance = bound_covariance(vector, jnp.stack([jnp.asarray(s, float) for s in start]), runs, law)
+    difference = difference_covariance(vector, covariance, model.sample_period, law)
+    largest = max(float(np.max(np.abs(u))) for u in runs.command)
+    values = natural_values(from_vector(vector, law), law)
+    return Bound(
+        names(law), covariance, jnp.sqrt(jnp.diagonal(covariance)),
+        DIFFERENCE_ORDER, difference, jnp.sqrt(jnp.diagonal(difference)),
+        verdicts_of(names(law), np.asarray(values), np.asarray(covariance), largest),
+    )  # fmt: skip
+
+
+def law_of(drive: Physical, noise: Noise) -> Law:
+    """The terms that a robot has."""
+    return Law(
+        coupling=drive.coupling is not None,
+        memory=noise.correlation_time is not None,
+        slip=bool(noise.slip_along > 0.0 or noise.slip_heading > 0.0),
+    )
+
+
+@partial(jax.jit, static_argnames="law")
+def bound_covariance(vector: Array, start: Array, runs: Runs, law: Law) -> Array:
+    """Covariance (unknowns, unknowns) by the information of runs (runs, rows), all from one start state (5,): pure,
+    maps over trials. Their poses are not read."""
+    robot = from_vector(vector, law)
+    model = Model(0.0, robot.drive, robot.dead_zone)
+
+    def path(run):
+        step = run.step if jnp.ndim(run.step) == 0 else run.step[:-1]
+        return run_physical(model, run.command, step, State(*start)).pose
+
+    poses: Pose = jax.vmap(path, in_axes=(run_axes(runs),))(runs)
+    point = Point(vector, jnp.tile(start, (len(runs.seen), 1)))
+    return covariance_at(point, local_at(point, runs._replace(pose=poses), law), law)
+
+
+def natural_values(robot: Robot, law: Law) -> Array:
+    """The unknowns (unknowns,) of a robot in natural units, in the order of `names(law)`."""
+    parts = [*robot.drive.rate, *(g for row in robot.drive.gain for g in row), *robot.dead_zone]
+    parts += list(robot.drive.coupling) if law.coupling else []
+    noise = robot.noise
+    parts += [noise.position, noise.heading]
+    parts += [noise.correlation_time] if law.memory else []
+    parts += [noise.slip_along, noise.slip_heading] if law.slip else []
+    return jnp.stack([jnp.asarray(part) for part in parts])
+
+
+def difference_covariance(vector: Array, covariance: Array, period: Array, law: Law) -> Array:
+    """Covariance (12, 12) in DIFFERENCE_ORDER of the hold image at a period [s], carried to first order; the coupling
+    is neglected as in the image itself."""
+
+    def image(values):
+        drive = Physical(values[:2], values[2:6].reshape(2, 2))
+        return difference_vector(to_difference(drive, period), values[6:8])
+
+    slope = jax.jacfwd(image)(natural_values(from_vector(vector, law), law)[:8])
+    return slope @ covariance[:8, :8] @ slope.T
+
+
+def spread_of(covariance: Array, difference: Array, law: Law) -> Spread:
+    """Standard deviations in the shape of a model's parameters, from both covariances."""
+    deviation = dict(zip(names(law), np.sqrt(np.diagonal(np.asarray(covariance))), strict=True))
+    image = np.sqrt(np.diagonal(np.asarray(difference)))
+    values = np.array(list(deviation.values()))
+    return Spread(
+        alpha=image[:2], delta=image[2:6].reshape(2, 2), epsilon=image[6:10].reshape(2, 2), dead_zone=image[10:],
+        physical=Physical(values[:2], values[2:6].reshape(2, 2), values[8:10] if law.coupling else np.zeros(2)),
+        noise=Noise(*(deviation.get(name) for name in Noise._fields)),
+    )  # fmt: skip

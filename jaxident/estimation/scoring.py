@@ -1,0 +1,223 @@
+"""Fisher scoring with Levenberg-Marquardt damping for unknowns shared by all runs and start states of each run.
+
+With z and log s of `likelihood`, gradient and expected curvature of -log p are sums over samples of
+    z dz + dlog s / 2        and        E' E + dlog s' dlog s / 2,   E = dz + z dlog s / 2
+(E is the derivative of the innovation over sqrt(s)). Start states touch their own run alone: they are eliminated run by
+run (Schur complement), so that the cost grows linearly with runs. optimistix has no solver for either structure.
+"""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxident.array_types import Array
+from jaxident.estimation.likelihood import innovations
+from jaxident.estimation.parameters import Law, bounds, is_logarithmic, names
+from jaxident.estimation.runs import Runs, run_axes
+
+START_STATES = 5
+FIRST_DAMPING, EASE, STIFFEN = 1e-3, 0.1, 10.0
+LARGEST_DAMPING = 1e12
+FLAT = 1e-13
+TOLERANCE = 1e-7
+"""Expected fall of -log p below which the search ends: a step of 4e-4 standard deviations."""
+KINK_STEP, KINK_TOLERANCE = 1e-2, 1e-4
+"""At a kink: steps of dead zones below this many standard deviations fail, and the rest promises less than this."""
+DEAD_ZONES = slice(6, 8)
+LONGEST_LOG_STEP, LONGEST_SHARE = 1.5, 0.25
+"""A step changes a logarithm by at most this much, and a dead zone by this share of its bound."""
+
+
+class Point(NamedTuple):
+    """Unknowns: shared vector (unknowns,), start states (runs, 5)."""
+
+    shared: Any
+    starts: Any
+
+
+class Local(NamedTuple):
+    """-log p at a point, its gradient in both parts, and expected curvature: shared (unknowns, unknowns), of each start
+    (runs, 5, 5), and between them (runs, unknowns, 5)."""
+
+    value: Any
+    gradient: Point
+    shared: Any
+    starts: Any
+    between: Any
+
+
+class Search(NamedTuple):
+    """Where a search stands: its best point, the curvature there, the point to look at next, damping, steps taken,
+    whether it has arrived."""
+
+    point: Point
+    local: Local
+    proposed: Point
+    damping: Any
+    steps: Any
+    arrived: Any
+
+
+def local_at(point: Point, runs: Runs, law: Law) -> Local:
+    """Value, gradient and expected curvature at a point, by forward-mode derivatives through the simulator."""
+
+    of_run = _general_local if law.memory or law.slip else _white_local
+    cut = len(names(law))
+    unknowns = jnp.concatenate([jnp.tile(point.shared, (len(point.starts), 1)), point.starts], axis=1)
+    over = jax.vmap(lambda own, run: of_run(own, run, law), in_axes=(0, run_axes(runs)))
+    value, gradient, curvature = over(unknowns, runs)
+    return Local(
+        jnp.sum(value),
+        Point(jnp.sum(gradient[:, :cut], axis=0), gradient[:, cut:]),
+        jnp.sum(curvature[:, :cut, :cut], axis=0),
+        curvature[:, cut:, cut:],
+        curvature[:, :cut, cut:],
+    )
+
+
+def _general_local(unknowns: Array, run: Runs, law: Law) -> tuple[Array, Array, Array]:
+    """Value, gradient and curvature of one run in its shared and own unknowns (n,)."""
+
+    def both(unknowns):
+        found = innovations(unknowns[:-START_STATES], unknowns[-START_STATES:], run, law)
+        return found, found
+
+    slopes, found = jax.jacfwd(both, has_aux=True)(unknowns)
+    dz, dlog = (part.reshape(-1, len(unknowns)) for part in slopes)
+    z, log_variance = found.normalised.ravel(), found.log_variance.ravel()
+    error = dz + 0.5 * z[:, None] * dlog
+    gradient = dz.T @ z + 0.5 * jnp.sum(dlog, axis=0)
+    return 0.5 * jnp.sum(z**2 + log_variance), gradient, error.T @ error + 0.5 * dlog.T @ dlog
+
+
+def _white_local(unknowns: Array, run: Runs, law: Law) -> tuple[Array, Array, Array]:
+    """The same where the camera error is white and nothing slips: both deviations enter in closed form."""
+    first = names(law).index("position")
+    deviations = unknowns[first : first + 2]
+    others = jnp.concatenate([unknowns[:first], unknowns[first + 2 :]])
+
+    def both(others):
+        shared = jnp.concatenate([others[:first], deviations])
+        found = innovations(shared, others[first:], run, law)
+        return found.normalised, found
+
+    slope, found = jax.jacfwd(both, has_aux=True)(others)
+    slope, z = slope.reshape(-1, len(others)), found.normalised
+    seen = jnp.sum(run.seen)
+    count, squares = jnp.stack([2 * seen, seen]), jnp.stack([jnp.sum(z[:2] ** 2), jnp.sum(z[2] ** 2)])
+    place = jnp.concatenate([jnp.arange(first), jnp.arange(first + 2, len(unknowns))])
+    curvature = jnp.zeros((len(unknowns),) * 2).at[place[:, None], place].set(slope.T @ slope)
+    gradient = jnp.zeros(len(unknowns)).at[place].set(slope.T @ z.ravel())
+    where = first + jnp.arange(2)
+    curvature = curvature.at[where, where].set(2.0 * count)
+    value = 0.5 * (jnp.sum(squares) + jnp.sum(found.log_variance))
+    return value, gradient.at[where].set(count - squares), curvature
+
+
+def rescale(point: Point, runs: Runs, law: Law) -> Point:
+    """The point with both camera deviations at their optimum for the rest, in closed form; without slip only."""
+    if law.slip:
+        return point
+    found = jax.vmap(lambda start, run: innovations(point.shared, start, run, law), in_axes=(0, run_axes(runs)))(
+        point.starts, runs
+    )
+    squares = jnp.sum(found.normalised**2, axis=(0, 2))
+    count = jnp.maximum(jnp.sum(runs.seen), 1)
+    mean = jnp.stack([0.5 * (squares[0] + squares[1]), squares[2]]) / count
+    first = names(law).index("position")
+    moved = point.shared.at[first : first + 2].add(0.5 * jnp.log(jnp.maximum(mean, 1e-30)))
+    low, high = bounds(law, jnp.inf)
+    return point._replace(shared=jnp.clip(moved, low, high))
+
+
+def eliminate(local: Local, damping: Array, held: Array) -> tuple[Array, Array, Array]:
+    """The curvature of the shared unknowns with the start states eliminated, its gradient, and the elimination
+    (runs, 5, unknowns + 1); `held` unknowns (unknowns,) stay where they are."""
+    free = jnp.where(held, 0.0, 1.0)
+    shared = local.shared * free[:, None] * free + jnp.diag(1.0 - free)
+    shared = shared + damping * jnp.diag(jnp.diagonal(shared))
+    diagonal = jnp.diagonal(local.starts, axis1=1, axis2=2)
+    starts = local.starts + jax.vmap(jnp.diag)(damping * diagonal + 1e-12 * jnp.max(diagonal, axis=1, keepdims=True))
+    between = local.between * free[:, None]
+    right = jnp.concatenate([between.transpose(0, 2, 1), local.gradient.starts[:, :, None]], axis=2)
+    solved = jnp.linalg.solve(starts, right)
+    reduced = jnp.sum(between @ solved, axis=0)
+    return shared - reduced[:, :-1], free * local.gradient.shared - reduced[:, -1], solved
+
+
+def newton(local: Local, damping: Array, held: Array) -> tuple[Array, Array, Array]:
+    """The step in the shared unknowns and the start states with some unknowns held, and the fall it promises."""
+    shared, gradient, solved = eliminate(local, damping, held)
+    step = -jnp.linalg.solve(shared, gradient)
+    starts = -(solved[:, :, -1] + solved[:, :, :-1] @ step)
+    promised = -0.5 * (jnp.sum(step * local.gradient.shared) + jnp.sum(starts * local.gradient.starts))
+    return step, starts, promised
+
+
+def propose(point: Point, local: Local, damping: Array, law: Law, low: Array, high: Array) -> tuple[Point, Array]:
+    """The damped step from a point, shortened where it is long and cut at the bounds, and whether the point is a
+    minimum.
+
+    It is one where the whole step promises next to nothing, or at a kink: where a dead zone meets a level of the
+    commands the cost has two slopes. Both may point up, so that ever smaller steps of the dead zone fail while all
+    other unknowns are at rest.
+    """
+    slope = local.gradient.shared
+    held = ((point.shared <= low) & (slope > 0.0)) | ((point.shared >= high) & (slope < 0.0))
+    step, starts, promised = newton(local, damping, held)
+    longest = jnp.where(is_logarithmic(law), LONGEST_LOG_STEP, jnp.inf)
+    longest = longest.at[DEAD_ZONES].set(LONGEST_SHARE * high[DEAD_ZONES])
+    part = jnp.minimum(1.0, jnp.min(longest / jnp.maximum(jnp.abs(step), 1e-300)))
+    moved = jnp.clip(point.shared + part * step, low, high)
+    level = (promised >= 0.0) & (promised < TOLERANCE) & (damping <= FIRST_DAMPING)
+    _, _, others = newton(local, jnp.asarray(1e-9), held.at[DEAD_ZONES].set(True))
+    tiny = jnp.abs(step) * jnp.sqrt(jnp.diagonal(local.shared)) < KINK_STEP
+    kink = (others >= 0.0) & (others < KINK_TOLERANCE) & jnp.all(tiny[DEAD_ZONES])
+    return Point(moved, point.starts + part * starts), level | kink
+
+
+def search_from(point: Point, runs: Runs, law: Law, d_max: Array, most: int) -> Search:
+    """Walk downhill from a point until a step promises less than TOLERANCE, at most `most` steps."""
+    low, high = bounds(law, d_max)
+
+    def body(search):
+        there = rescale(search.proposed, runs, law)
+        local = local_at(there, runs, law)
+        better = (local.value <= search.local.value) | (search.steps == 0)
+        point, local = jax.tree.map(lambda a, b: jnp.where(better, a, b), (there, local), (search.point, search.local))
+        damping = jnp.maximum(search.damping * jnp.where(better, EASE, STIFFEN), 1e-9)
+        proposed, arrived = propose(point, local, damping, law, low, high)
+        return Search(point, local, proposed, damping, search.steps + 1, arrived)
+
+    def walking(search):
+        return ~search.arrived & (search.steps < most) & (search.damping < LARGEST_DAMPING)
+
+    unknown, inf = len(names(law)), jnp.asarray(jnp.inf)
+    runs_count = len(point.starts)
+    nothing = Local(
+        inf,
+        jax.tree.map(jnp.zeros_like, point),
+        jnp.zeros((unknown, unknown)),
+        jnp.zeros((runs_count, START_STATES, START_STATES)),
+        jnp.zeros((runs_count, unknown, START_STATES)),
+    )
+    first = Search(point, nothing, point, jnp.asarray(FIRST_DAMPING), jnp.asarray(0), jnp.asarray(False))
+    return jax.lax.while_loop(walking, body, first)
+
+
+def covariance_at(point: Point, local: Local, law: Law) -> Array:
+    """Covariance (unknowns, unknowns) of the shared unknowns in natural units, start states and noise law as nuisance:
+    the inverse of the expected curvature.
+
+    Directions that the data do not determine get a finite, enormous variance (curvature floored at FLAT of the largest,
+    all unknowns scaled alike).
+    """
+    shared, _, _ = eliminate(local, jnp.asarray(0.0), jnp.zeros(len(names(law)), bool))
+    scale = jnp.sqrt(jnp.diagonal(local.shared))
+    scale = jnp.where(scale > 0.0, scale, 1.0)
+    values, vectors = jnp.linalg.eigh(shared / scale[:, None] / scale)
+    values = jnp.maximum(values, FLAT * jnp.maximum(values[-1], FLAT))
+    natural = jnp.where(is_logarithmic(law), jnp.exp(point.shared), 1.0) / scale
+    rows = natural[:, None] * vectors / jnp.sqrt(values)
+    return rows @ rows.T

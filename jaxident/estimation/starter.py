@@ -1,0 +1,186 @@
+"""A first estimate from the data alone: a global search in which everything but dead zones and rates is linear.
+
+For given dead zones D and rate r, heading is linear in the gains of its row and in each window's heading and turn rate
+at its start; with the measured heading as direction, so are x and y in the gains of theirs. Windows with a start of
+their own keep slip and drift from piling up. Concentrated over the noise, each channel's cost is n/2 log(squares),
+the two are added, and the lowest pair of dead zones on a grid wins; a second, finer grid follows.
+"""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxident.array_types import Array
+from jaxident.estimation.runs import Runs
+from jaxident.numerics import hold_integrals, safe_divide, sin_cos
+from jaxident.robot.dead_zone import dead_zone
+
+WIDTHS, RATES, LOOKS, FINER = 9, 7, 3, 3.0
+"""Dead zones and rates in a grid, how many grids, each FINER times as fine in dead zones as the one before; in rates
+the next grid spans the neighbours of the best."""
+SLOWEST, FASTEST = 0.25, 2.5
+"""Rates searched first: from SLOWEST per window to FASTEST per step."""
+
+
+class Channel(NamedTuple):
+    """One channel of windows (windows, rows): measured coordinates (windows, rows, coordinates), the direction in which
+    a path counts (windows, rows, coordinates), and weights 1 or 0 (windows, rows)."""
+
+    measured: Any
+    direction: Any
+    weight: Any
+
+
+class Fits(NamedTuple):
+    """Squares left for every rate and pair of dead zones (rates, right, left), and both gains there (..., 2)."""
+
+    squares: Any
+    gain: Any
+
+
+class Start(NamedTuple):
+    """A first estimate: rate (2,), gain (2, 2), dead_zone (2,), and root-mean-square residual (2,) [m], [rad]."""
+
+    rate: Any
+    gain: Any
+    dead_zone: Any
+    residual: Any
+
+
+def first_estimate(windows: Runs, d_max: Array) -> Start:
+    """The best of two grids over dead zones in [0, d_max] and rates; windows (windows, rows)."""
+    pair = channels(windows)
+    rows, step = windows.seen.shape[1], jnp.mean(windows.step)
+    counts = jnp.stack([jnp.sum(c.weight) * c.measured.shape[-1] for c in pair])
+
+    def look(grid, finer):
+        """The best of a grid (rates (2, RATES), widths (2, WIDTHS)), and the next grid around it."""
+        rates, widths = grid
+        best = _search(pair, windows, rates, widths, counts)
+        spread = (rates[0, 1] / rates[0, 0]) ** jnp.linspace(-1.0, 1.0, RATES)
+        sides = 0.5 * d_max * finer * jnp.linspace(-1.0, 1.0, WIDTHS)
+        return (best.rate[:, None] * spread, jnp.clip(best.dead_zone[:, None] + sides, 0.0, d_max)), best
+
+    rates = jnp.geomspace(SLOWEST / (rows * step), FASTEST / step, RATES)
+    widths = jnp.linspace(0.0, d_max, WIDTHS)
+    first = jnp.tile(rates, (2, 1)), jnp.tile(widths, (2, 1))
+    _, found = jax.lax.scan(look, first, FINER ** -jnp.arange(1.0, LOOKS + 1))
+    best = jax.tree.map(lambda leaf: leaf[-1], found)
+    return best._replace(residual=jnp.sqrt(best.residual / jnp.maximum(counts, 1.0)))
+
+
+def channels(windows: Runs) -> tuple[Channel, Channel]:
+    """Position and heading of windows as channels; the heading is unwrapped and bridged where it is missing."""
+    seen = windows.seen
+    heading = jax.vmap(_bridge)(windows.pose.theta, seen)
+    turn = jnp.diff(heading, axis=1, append=heading[:, -1:])
+    sine, cosine = sin_cos(heading + 0.5 * turn)
+    chord = jnp.sinc(turn / (2.0 * jnp.pi))
+    position = jnp.stack([windows.pose.x, windows.pose.y], axis=-1)
+    along = Channel(position, jnp.stack([chord * cosine, chord * sine], axis=-1), seen.astype(float))
+    return along, Channel(heading[..., None], jnp.ones_like(heading)[..., None], seen.astype(float))
+
+
+def _bridge(theta: Array, seen: Array) -> Array:
+    """Heading (rows,) without jumps, linear between the rows where it was seen."""
+    rows = jnp.arange(len(theta))
+    before = jax.lax.cummax(jnp.where(seen, rows, -1))
+    after = jax.lax.cummin(jnp.where(seen, rows, len(theta)), reverse=True)
+    before = jnp.where(before < 0, jnp.minimum(after, len(theta) - 1), before)
+    after = jnp.where(after >= len(theta), before, after)
+    last = jnp.concatenate([before[:1], before[:-1]])
+    change = jnp.where(seen, theta - theta[last], 0.0)
+    whole = theta[before[0]] + jnp.cumsum(change - 2.0 * jnp.pi * jnp.round(change / (2.0 * jnp.pi)))
+    part = safe_divide(rows - before, after - before, jnp.zeros(len(theta)))
+    return whole[before] + part * (whole[after] - whole[before])
+
+
+def _search(pair: tuple, windows: Runs, rates: Array, widths: Array, counts: Array) -> Start:
+    """The best point of a grid, its squares (2,) in `residual`; counts (2,): how many numbers each channel has."""
+    fits = [_fit(channel, windows, rate, widths) for channel, rate in zip(pair, rates, strict=True)]
+    costs = [n * jnp.log(jnp.min(fit.squares, axis=0)) for n, fit in zip(counts, fits, strict=True)]
+    right, left = jnp.unravel_index(jnp.argmin(costs[0] + costs[1]), costs[0].shape)
+    best = [jnp.argmin(fit.squares[:, right, left]) for fit in fits]
+    return Start(
+        rate=jnp.stack([rate[k] for rate, k in zip(rates, best, strict=True)]),
+        gain=jnp.stack([fit.gain[k, right, left] for fit, k in zip(fits, best, strict=True)]),
+        dead_zone=jnp.stack([widths[0][right], widths[1][left]]),
+        residual=jnp.stack([fit.squares[k, right, left] for fit, k in zip(fits, best, strict=True)]),
+    )
+
+
+def _fit(channel: Channel, windows: Runs, rates: Array, grid: Array) -> Fits:
+    """Least squares in both gains and every window's start, for all rates and pairs of dead zones (2, widths)."""
+    passed = [dead_zone(u.T[..., None], widths) for u, widths in zip(windows.command, grid, strict=True)]
+    pull = jnp.concatenate(passed, axis=-1)
+    step = windows.step if jnp.ndim(windows.step) == 0 else windows.step.T[..., None]
+    products = jax.lax.map(lambda rate: _products(channel, step, pull, rate), rates)
+    widths = grid.shape[1]
+    gram, cross, power = products[:, :-1, :-1], products[:, :-1, -1], products[:, -1, -1]
+    a, c = (jnp.diagonal(gram[:, cut, cut], axis1=1, axis2=2) for cut in (slice(None, widths), slice(widths, None)))
+    a, b, c = a[:, :, None], gram[:, :widths, widths:], c[:, None, :]
+    u, v = cross[:, :widths, None], cross[:, None, widths:]
+    determinant = a * c - b * b
+    regular = determinant > 1e-9 * a * c
+    safe = jnp.where(regular, determinant, 1.0)
+    gains = [jnp.where(regular, top / safe, 0.0) for top in (c * u - b * v, a * v - b * u)]
+    squares = power[:, None, None] - gains[0] * u - gains[1] * v
+    return Fits(jnp.maximum(squares, 1e-14 * power[:, None, None] + 1e-300), jnp.stack(gains, axis=-1))
+
+
+def _products(channel: Channel, step: Array, pull: Array, rate: Array) -> Array:
+    """Inner products (columns + 1, columns + 1) at one rate of the paths that accelerations (rows, windows, columns)
+    cause and, last, of the data; start position and start speed of every window projected out."""
+    measured, direction = (jnp.moveaxis(part, 0, 1)[:, :, None] for part in (channel.measured, channel.direction))
+    weight = channel.weight.T[:, :, None, None]
+    table = jnp.concatenate([_lay(rate, step, pull, direction), measured], axis=2)
+    mean = jnp.sum(weight * table, axis=0) / jnp.maximum(jnp.sum(weight, axis=0), 1.0)
+    table = weight * (table - mean)
+    coast = table[:, :, :1]
+    power = jnp.sum(coast**2, axis=(0, 3), keepdims=True)
+    share = safe_divide(jnp.sum(coast * table, axis=(0, 3), keepdims=True), power, jnp.zeros(()))
+    free = jnp.moveaxis(table - share * coast, 2, 0)[1:].reshape(table.shape[2] - 1, -1)
+    return free @ free.T
+
+
+def _lay(rate: Array, step: Array, pull: Array, direction: Array) -> Array:
+    """Coordinates (rows, windows, 1 + columns, coordinates) of paths laid along a direction per row (rows, windows, 1,
+    coordinates): first of coasting from speed 1, then from rest under accelerations (rows, windows, columns)."""
+    even = jnp.ndim(step) == 0
+    shared = hold_integrals(rate, step)
+    pull = jnp.concatenate([jnp.zeros_like(pull[..., :1]), pull], axis=-1)
+
+    def body(now, row):
+        speed, place = now
+        own, pull, direction = row
+        decay, once, twice = shared if even else own
+        moved = place + (once * speed + twice * pull)[..., None] * direction
+        return (decay * speed + once * pull, moved), place
+
+    first = jnp.zeros(pull.shape[1:]).at[:, 0].set(1.0)
+    return jax.lax.scan(
+        body, (first, jnp.zeros((*first.shape, direction.shape[-1]))), (None if even else shared, pull, direction)
+    )[1]
+
+
+def start_states(start: Start, windows: Runs) -> Array:
+    """The state (windows, 5) x, y, theta, v, w at the first row of every window, by the same least squares."""
+    step = windows.step if jnp.ndim(windows.step) == 0 else windows.step.T[..., None]
+    passed = [dead_zone(u.T, width) for u, width in zip(windows.command, start.dead_zone, strict=True)]
+
+    def of_channel(channel, row):
+        measured, direction = (jnp.moveaxis(part, 0, 1)[:, :, None] for part in (channel.measured, channel.direction))
+        weight = channel.weight.T[:, :, None, None]
+        pull = sum(gain * m for gain, m in zip(start.gain[row], passed, strict=True))[..., None]
+        laid = _lay(start.rate[row], step, pull, direction)
+        coast, rest = laid[:, :, :1], measured - laid[:, :, 1:]
+        count = jnp.maximum(jnp.sum(weight, axis=0), 1.0)
+        mean_coast, mean_rest = (jnp.sum(weight * part, axis=0) / count for part in (coast, rest))
+        centred = weight * (coast - mean_coast)
+        power = jnp.sum(centred**2, axis=(0, 3))
+        speed = safe_divide(jnp.sum(centred * rest, axis=(0, 3)), power, jnp.zeros(()))
+        return mean_rest[:, 0] - speed * mean_coast[:, 0], speed
+
+    (position, v), (heading, w) = (of_channel(channel, row) for row, channel in enumerate(channels(windows)))
+    return jnp.concatenate([position, heading, v, w], axis=1)

@@ -1,0 +1,188 @@
+"""Maximum likelihood: recovery, efficiency and coverage, several runs, gaps, uneven steps, batches, corners."""
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from jaxident.array_types import AT_REST, Pose, Wheels
+from jaxident.errors import InputError
+from jaxident.estimation.identify import identify
+from jaxident.estimation.maximum_likelihood import fit_runs
+from jaxident.estimation.noise_law import NOISE_LAWS
+from jaxident.estimation.parameters import Law, Robot, bounds, from_vector, names, to_vector
+from jaxident.estimation.precision import bound_covariance, natural_values
+from jaxident.estimation.runs import Runs, stack_runs
+from jaxident.estimation.scoring import Point, _general_local, _white_local, local_at
+from jaxident.log import Log, make_log
+from jaxident.robot.drive import Physical
+from jaxident.robot.excitation import EXCITATIONS
+from jaxident.robot.model import Model
+from jaxident.robot.noise import Noise, draw_noise, observe
+from jaxident.robot.simulate import run_physical, simulate
+
+PERIOD = 1.0 / 30.0
+DRIVE = Physical(np.array([0.541386, 7.817043]), np.array([[0.128988, 0.127287], [66.824208, -65.25288]]))
+DEAD_ZONE = np.array([0.25, 0.2])
+D_MAX = 0.9
+
+
+def simulated(key, name, noise, rows=1000):
+    """One run (1, rows) of the diagonal robot."""
+    key, own = jax.random.split(key)
+    command, unit = EXCITATIONS[name](key, rows), draw_noise(own, rows)
+    state = run_physical(Model(PERIOD, DRIVE, DEAD_ZONE, noise), command, jnp.asarray(PERIOD), AT_REST, unit)
+    pose = observe(state.pose, noise, unit, jnp.asarray(PERIOD))
+    seen = jnp.ones((1, rows), bool)
+    return Runs(jnp.asarray(PERIOD), Wheels(*(u[None] for u in command)), Pose(*(c[None] for c in pose)), seen)
+
+
+def logged(seed, noise=None, rows=300, jitter=0.0):
+    """A log of the diagonal robot; jitter is the relative spread of the steps."""
+    command = EXCITATIONS["multilevel"](jax.random.key(seed), rows, hold=10)
+    step = PERIOD * (1.0 + jitter * np.random.default_rng(seed).uniform(-1.0, 1.0, rows))
+    log = make_log(np.cumsum(step), *(np.asarray(u) for u in command))
+    made = simulate(Model(PERIOD, DRIVE, DEAD_ZONE, noise or Noise()), log, key=jax.random.key(100 + seed))
+    return Log(*(np.asarray(column) for column in made))
+
+
+def trials(name, noise, law, count, rows=1000):
+    """Errors over the bound (trials, unknowns), errors over the fit's own deviation, and whether each fit is ok."""
+
+    @jax.jit
+    @jax.vmap
+    def one(key):
+        runs = simulated(key, name, noise, rows)
+        fit = fit_runs(runs, D_MAX, law)
+        vector = to_vector(Robot(DRIVE, DEAD_ZONE, noise), law)
+        bound = jnp.sqrt(jnp.diagonal(bound_covariance(vector, jnp.zeros(5), runs, law)))
+        error = natural_values(fit.robot, law) - natural_values(from_vector(vector, law), law)
+        return error / bound, error / jnp.sqrt(jnp.diagonal(fit.covariance)), fit.ok
+
+    return tuple(map(np.asarray, one(jax.random.split(jax.random.key(7), count))))
+
+
+def test_exact_data_are_recovered():
+    found = identify(logged(0), noise_law="white")
+    assert found.ok
+    np.testing.assert_allclose(found.model.physical.rate, DRIVE.rate, rtol=1e-6)
+    np.testing.assert_allclose(found.model.physical.gain, DRIVE.gain, rtol=1e-6)
+    np.testing.assert_allclose(found.model.dead_zone, DEAD_ZONE, rtol=1e-6)
+
+
+def test_errors_stay_near_the_bound_and_intervals_cover():
+    """RMS over the bound of 8 parameters in 48 trials: each is within 1 +- 3 / sqrt(2 * 48), their mean (correlated) in
+    a narrower band; 384 intervals cover 95 % within 3 standard errors of some 2 %."""
+    over_bound, over_own, ok = trials("multilevel", Noise(1e-3, 1e-2), Law(), 48)
+    assert ok.all()
+    rms = np.sqrt(np.mean(over_bound[:, :8] ** 2, axis=0))
+    assert rms.max() < 1.31
+    assert 0.85 < rms.mean() < 1.15
+    assert np.mean(np.abs(over_own[:, :8]) < 1.96) > 0.89
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["multilevel", "staircase"])
+@pytest.mark.parametrize("millimetres", [0.2, 0.5, 1.0, 2.0, 5.0])
+def test_every_cell_reaches_the_bound(name, millimetres):
+    """500 seeds: each RMS has a standard error of 3 %."""
+    over_bound, _, ok = trials(name, Noise(1e-3 * millimetres, 1e-2 * millimetres), Law(), 500)
+    assert ok.mean() >= 0.995
+    rms = np.sqrt(np.mean(over_bound[ok, :8] ** 2, axis=0))
+    assert rms.max() < 1.15
+    assert rms.mean() < 1.03 + 0.02
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "noise", [Noise(1e-3, 1e-2, -PERIOD / np.log(0.9)), Noise(1e-3, 1e-2, None, 0.01, 0.1)], ids=["ar1", "slip"]
+)
+def test_intervals_cover_under_the_law_that_made_the_data(noise):
+    """64 trials of 8 parameters, of which some are correlated: 95 % within 3 points."""
+    law = Law(memory=noise.correlation_time is not None, slip=noise.slip_along > 0.0)
+    _, over_own, ok = trials("multilevel", noise, law, 64, 500)
+    assert ok.mean() > 0.98
+    assert 0.92 < np.mean(np.abs(over_own[ok, :8]) < 1.96) < 0.98
+
+
+def test_several_uneven_runs_with_gaps_are_one_fit():
+    noise = Noise(1e-4, 1e-3)
+    first, second = logged(1, noise, 260, 0.3), logged(2, noise, 300, 0.3)
+    blind = np.arange(len(first.t)) % 7 == 3
+    first = first._replace(**{c: np.where(blind, np.nan, getattr(first, c)) for c in ("x", "y", "theta")})
+    found = identify([first, second], noise_law="white")
+    assert found.ok
+    error = np.ravel(found.model.physical.gain) - np.ravel(DRIVE.gain)
+    assert np.all(np.abs(error) < 4.0 * np.sqrt(np.diag(found.covariance))[2:6])
+    assert np.array_equal(np.isnan(found.residuals.x), np.concatenate([blind, np.zeros(300, bool)]))
+    assert np.nanstd(found.residuals.x) == pytest.approx(1e-4, rel=0.15)
+
+
+def test_batch_is_the_loop_and_compiles_once():
+    keys = jax.random.split(jax.random.key(3), 3)
+    runs = jax.vmap(lambda key: simulated(key, "multilevel", Noise(1e-3, 1e-2), 300))(keys)
+    compiled = jax.jit(lambda r: fit_runs(r, D_MAX))
+    together = jax.jit(jax.vmap(lambda r: fit_runs(r, D_MAX)))(runs)
+    for k in range(3):
+        alone = compiled(jax.tree.map(lambda leaf, k=k: leaf[k], runs))
+        np.testing.assert_allclose(
+            natural_values(alone.robot, Law()), jax.vmap(lambda r: natural_values(r, Law()))(together.robot)[k],
+            rtol=1e-6,
+        )  # fmt: skip
+    assert compiled._cache_size() == 1
+
+
+def test_auto_finds_the_noise_law():
+    memory = identify(logged(4, Noise(1e-3, 1e-2, 0.3), 400))
+    assert memory.model.noise.correlation_time == pytest.approx(0.3, rel=0.5)
+    assert memory.model.noise.slip_along == 0.0
+    white = identify(logged(4, Noise(1e-3, 1e-2), 400))
+    assert white.model.noise.correlation_time is None
+    assert white.model.noise.position == pytest.approx(1e-3, rel=0.15)
+
+
+@pytest.mark.parametrize("law", list(NOISE_LAWS.values()))
+def test_derivatives_are_finite_at_corners(law):
+    """At rest, on a dead zone's edge, at both ends of the bounds, and with no pose at all."""
+    log = make_log(PERIOD * np.arange(30), np.full(30, 0.25), np.full(30, -0.2), *np.zeros((3, 30)))
+    runs = jax.tree.map(jnp.asarray, stack_runs(log))
+    vector = to_vector(Robot(DRIVE, DEAD_ZONE, Noise(1e-3, 1e-2, 0.1, 0.01, 0.1)), law)
+    low, high = bounds(law, jnp.asarray(D_MAX))
+    local = jax.jit(lambda v, r: local_at(Point(v, jnp.zeros((1, 5))), r, law))
+    for point in (vector, jnp.where(jnp.isfinite(low), low, 0.0), jnp.where(jnp.isfinite(high), high, 0.0)):
+        for seen in (runs.seen, jnp.zeros_like(runs.seen)):
+            found = local(point, runs._replace(seen=seen))
+            assert all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves(found))
+
+
+def test_what_cannot_be_fitted_says_why():
+    log = logged(5)
+    still = log._replace(x=0.0 * log.x, y=0.0 * log.y, theta=0.0 * log.theta)
+    for bad, settings, words in (
+        (still, {}, "nothing moves"),
+        (log.rows(0, 15), {}, "15 rows"),
+        (log, {"noise_law": "pink"}, "noise law 'pink'"),
+        (log, {"setup_time": 3.0}, "setup time"),
+    ):
+        with pytest.raises(InputError, match=words):
+            identify(bad, **settings)
+
+
+def test_vectors_come_back_as_the_robot():
+    law = Law(coupling=True, memory=True, slip=True)
+    robot = Robot(DRIVE._replace(coupling=np.array([0.1, -0.2])), DEAD_ZONE, Noise(1e-3, 1e-2, 0.1, 0.01, 0.1))
+    again = natural_values(from_vector(to_vector(robot, law), law), law)
+    np.testing.assert_allclose(again, natural_values(robot, law), rtol=1e-12)
+    assert len(again) == len(names(law)) == 15
+
+
+def test_white_shortcut_is_the_general_curvature():
+    runs = jax.tree.map(jnp.asarray, stack_runs(logged(6, Noise(1e-3, 1e-2), 60)))
+    run = jax.tree.map(lambda leaf: leaf[0] if jnp.ndim(leaf) else leaf, runs)
+    vector = to_vector(Robot(DRIVE, DEAD_ZONE, Noise(1e-3, 1e-2)), Law())
+    unknowns = jnp.concatenate([vector, 0.01 * jnp.ones(5)])
+    both = [jax.jit(partial(part, law=Law()))(unknowns, run) for part in (_white_local, _general_local)]
+    for a, b in zip(*both, strict=True):
+        np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9 * np.max(np.abs(b)))
