@@ -63,7 +63,8 @@ def backlash(position: Array, m: Array, step: Array, width: Array) -> tuple[Arra
     half = 0.5 * width
     remaining = jnp.maximum(half - jnp.sign(m) * position, 0.0)
     free = jnp.clip(safe_divide(remaining, jnp.abs(m) * step, 0.0), 0.0, 1.0)
-    return jnp.clip(position + m * step, -half, half), free
+    loose = width > 0.0  # without play the bounds meet, and the derivative of a clip between them is arbitrary
+    return jnp.where(loose, jnp.clip(position + m * step, -half, half), 0.0), jnp.where(loose, free, 0.0)
 
 
 def motor_lag(last: Array, m: Array, step: Array, time_constant: Array) -> tuple[Array, Array, Array, Array]:
@@ -73,7 +74,10 @@ def motor_lag(last: Array, m: Array, step: Array, time_constant: Array) -> tuple
     decay, once, twice = hold_integrals(1.0 / jnp.where(lagging, time_constant, 1.0), step)
     kept = safe_divide(once, step, 1.0)
     moment = safe_divide(step * once - twice, step * step, 0.5) - 0.5 * kept
-    decay, kept, moment = (jnp.where(lagging, value, 0.0) for value in (decay, kept, moment))
+    first = safe_divide(time_constant, step, 0.0)  # the limit of `kept`, which gives the derivative at no lag
+    decay, kept, moment = (
+        jnp.where(lagging, value, limit) for value, limit in ((decay, 0.0), (kept, first), (moment, -0.5 * first))
+    )
     gap = last - m
     return m + gap * decay, m + gap * kept, 12.0 * moment * gap, kept
 

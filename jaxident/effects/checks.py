@@ -44,8 +44,8 @@ def check_delay(effects: Sequence[Effect], duration: float) -> None:
         delay = effect.parameters.get("delay", 0.0) if effect.name == "transport_delay" else 0.0
         if not isinstance(delay, jax.core.Tracer) and np.any(np.asarray(delay) > duration):
             raise InputError(
-                f"effect 'transport_delay': delay is {float(np.max(delay)):g} s, longer than the log of {duration:g} s, "
-                f"so that no command would arrive; {_allowed('transport_delay')}"
+                f"effect 'transport_delay': delay is {np.max(delay):g} s, longer than the log of {duration:g} s: "
+                f"nothing would arrive; {_allowed('transport_delay')}"
             )
 
 

@@ -4,7 +4,6 @@ A wheel's speed is expressed as the command that would hold it, n = gain^-1 (rat
 wheels this is the speed of the rim over that per unit of command, and the track is not needed.
 """
 
-import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array, Wheels
@@ -12,8 +11,9 @@ from jaxident.effects.entry import ALONG, BOTH, UNIT, Entry, Parameter
 from jaxident.numerics import safe_divide
 from jaxident.robot.drive import Force
 
-SWEEPS = 8
-"""Of the two wheels' frictions against each other; where one wheel slides, each sweep settles what is left."""
+SWEEPS = 3
+"""Of the two wheels' frictions against each other, at each estimate of their levels: where one wheel slides, one
+settles the other."""
 
 Mobility = tuple[tuple[Array, Array], tuple[Array, Array]]
 """Change of the wheels' speeds over a step per unit of held force at each wheel, rows by speed."""
@@ -51,16 +51,16 @@ def dry_friction(before: Wheels, free: Wheels, mobility: Mobility, level) -> Whe
     drive = Wheels(free.right - before.right, free.left - before.left)
     both_stop, both_hold = _solve(mobility, free), _solve(mobility, drive)
 
-    def sweep(_, now):
-        right, left = now
-        after = Wheels(free.right - m_rr * right - m_rl * left, free.left - m_lr * right - m_ll * left)
-        moving = level(Wheels(*(0.5 * (a + b) for a, b in zip(before, after, strict=True))))
-        right = _one_wheel(before.right, free.right - m_rl * left, m_rr, moving.right, at_rest.right)
-        left = _one_wheel(before.left, free.left - m_lr * right, m_ll, moving.left, at_rest.left)
-        return Wheels(right, left)
+    def settled(moving: Wheels, right: Array, left: Array) -> tuple[Array, Array]:
+        for _ in range(SWEEPS):
+            right = _one_wheel(before.right, free.right - m_rl * left, m_rr, moving.right, at_rest.right)
+            left = _one_wheel(before.left, free.left - m_lr * right, m_ll, moving.left, at_rest.left)
+        return right, left
 
-    zero = Wheels(jnp.zeros_like(free.right), jnp.zeros_like(free.left))
-    alone = jax.lax.fori_loop(0, SWEEPS, sweep, zero, unroll=True)
+    right, left = settled(level(before), jnp.zeros_like(free.right), jnp.zeros_like(free.left))
+    after = Wheels(free.right - m_rr * right - m_rl * left, free.left - m_lr * right - m_ll * left)
+    middle = Wheels(*(0.5 * (a + b) for a, b in zip(before, after, strict=True)))
+    alone = settled(level(middle), right, left)
     pairs = [*zip(both_stop, at_rest, strict=True), *zip(both_hold, at_rest, strict=True)]
     stuck = jnp.all(jnp.stack([jnp.abs(f) < limit for f, limit in pairs]), axis=0)
     return Wheels(*(jnp.where(stuck, a, b) for a, b in zip(both_stop, alone, strict=True)))

@@ -12,9 +12,9 @@ from jaxident.robot import simulate as nominal
 from jaxident.robot.model import Model, require_physical
 
 SHARP_SUBSTEPS = 16
-"""Per interval where an effect has corners within a sample (friction, stiction, backlash, rate limit)."""
+"""Per interval where an effect has corners within a sample (friction, stiction, play, slew, the |w| of turn_loss)."""
 
-SHARP = ("coulomb_friction", "stiction", "backlash", "input_rate_limit")
+SHARP = ("turn_loss", "coulomb_friction", "stiction", "backlash", "input_rate_limit")
 
 
 def simulate(

@@ -4,6 +4,7 @@ Shares no code with the package. `simulate_reference` takes the robot as a dict 
 effects as {name: {parameter: value}} and returns camera poses (samples, 3). It is slow and meant to be plainly right.
 """
 
+import itertools
 import math
 
 import numpy as np
@@ -27,7 +28,7 @@ def simulate_reference(parameters, effects, t, u_r, u_l, start, *, session_time=
     stops = np.unique(np.concatenate([t, arrivals, [change]]))
     stops = stops[(stops >= t[0]) & (stops <= t[-1])]
     state, rows = np.array([*start, 0.0, 0.0, 0.0, 0.0]), [start[:3]]
-    for begin, end in zip(stops[:-1], stops[1:], strict=True):
+    for begin, end in itertools.pairwise(stops):
         middle = 0.5 * (begin + end)
         index = np.searchsorted(arrivals, middle) - 1
         robot.target = u[index] if index >= 0 else np.zeros(2)
@@ -62,7 +63,7 @@ class Robot:
         return self.effects.get(effect, {}).get(parameter, neutral)
 
     def run(self, state, begin, end, longest):
-        self.begin, start = begin, self.command
+        self.begin = begin
         now, steps = begin, max(1, math.ceil((end - begin) / longest))
         points = np.linspace(begin, end, steps + 1)[1:]
         for point in points:
@@ -70,7 +71,6 @@ class Robot:
                 now, state = self.step(state, now, point)
             now = point
         self.command = self.commanded(end)
-        assert start is not None
         return state
 
     def step(self, state, now, end):
@@ -160,7 +160,7 @@ class Robot:
 
     def unrubbed(self, state, now, engaged):
         """Acceleration of v and w without friction, and the push before the lag."""
-        x, y, theta, v, w = state[:5]
+        theta, v, w = state[[THETA, V, W]]
         push = np.where(engaged, self.pushes(now), 0.0)
         driving = push if self.lag == 0.0 else state[[Q_R, Q_L]]
         along = self.system @ [v, w] + self.gain @ driving
