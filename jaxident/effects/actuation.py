@@ -120,7 +120,7 @@ ENTRIES = (
          (Parameter("resistance", f"1/{UNIT}", 0.0, (0.0, 0.3), 0.1, least=0.0),), ("input_saturation",),
          "inner resistance of batteries; Plett 2015, Battery Management Systems, ch. 2"),
     _row("lost_commands", "u_k -> u_{k-1} with probability p",
-         (Parameter("probability", "", 0.0, (0.0, 0.2), 0.1, least=0.0, most=1.0),), ("transport_delay",),
+         (Parameter("probability", "", 0.0, (0.0, 0.5), 0.3, least=0.0, most=1.0),), ("transport_delay",),
          "radio links; Schenato et al. 2007, Foundations of control over lossy networks, Proc. IEEE 95",
          smooth=False, grid=(0.01, 0.02, 0.05, 0.1, 0.2), random=True, extension=True),
 )  # fmt: skip
