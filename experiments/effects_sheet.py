@@ -2,9 +2,9 @@
 
     python experiments/effects_sheet.py --out effects_sheet
 
-The published robot at each effect's typical size, started at every row from where the nominal robot is then (its pose
-and, settled for a second, its speeds): what one second takes it further than the nominal robot, by channel, against
-command, speed, heading, position and time. One picture per effect, and one sheet of all.
+The published robot at each effect's typical size and the nominal one under the same commands: what a tenth of a second
+takes the one further than the other, each in the frame of its own pose at the start, against command, speed, heading,
+position and time. One picture per effect, and one sheet of all.
 """
 
 import argparse
@@ -43,6 +43,11 @@ def departures(path: np.ndarray, nominal: np.ndarray) -> dict[str, np.ndarray]:
     return {"along": difference[:, 0], "lateral": difference[:, 1], "heading": difference[:, 2]}
 
 
+def channels(along: np.ndarray, heading: np.ndarray | None = None) -> dict[str, np.ndarray]:
+    """What the channels are drawn against: the same for all, or another for the heading."""
+    return {"along": along, "lateral": along, "heading": along if heading is None else heading}
+
+
 def local_motion(path: np.ndarray) -> np.ndarray:
     """Along, to the left, and the turn, from each row to the one HORIZON rows later: (samples - HORIZON, 3)."""
     step = path[HORIZON:] - path[:-HORIZON]
@@ -64,21 +69,23 @@ def main() -> None:
     nominal = np.asarray(run(jnp.asarray(NEUTRAL)))
     motion = local_motion(nominal)
     rows = slice(0, ROWS - HORIZON)
+    u_r, u_l = (np.asarray(u)[rows] for u in log.command)
+    v, w = (motion[:, k] / np.abs(motion[:, k]).max() for k in (0, 2))
     regressors = {
-        "command $u_r + u_l$ [unit]": np.asarray(log.u_r + log.u_l)[rows],
-        "speed $v$ [m/s]": motion[:, 0] / (HORIZON * robot.sample_period),
-        "heading [rad]": np.mod(nominal[rows, 2], 2 * np.pi),
-        "position $x$ [m]": nominal[rows, 0],
-        "time [s]": np.asarray(log.t)[rows],
+        "command: mean, for heading half difference": channels((u_r + u_l) / 2, (u_r - u_l) / 2),
+        "speed over its largest: $v$, for heading $w$": channels(v, w),
+        "heading [rad]": channels(np.mod(nominal[rows, 2], 2 * np.pi)),
+        "position $x$ [m]": channels(nominal[rows, 0]),
+        "time [s]": channels(np.asarray(log.t)[rows]),
     }
     found = {}
     for name, entry in CATALOGUE.items():
         path = np.asarray(run(to_vector([Effect(name, entry.typical())])))
         found[name] = departures(path, nominal)
-        figure, axes = ji.plot.figure(1, len(regressors), size=(10.0, 1.9))
+        figure, axes = ji.plot.figure(1, len(regressors), size=(13.0, 1.9))
         ji.plot.effect_signature(name, found[name], regressors, axes=axes)
         ji.plot.save(figure, options.out / f"{name}.png")
-    figure, axes = ji.plot.figure(len(found), len(regressors), size=(10.0, 1.45 * len(found)))
+    figure, axes = ji.plot.figure(len(found), len(regressors), size=(13.0, 1.45 * len(found)))
     in_order = sorted(found, key=lambda name: SITES.index(CATALOGUE[name].site))
     for name, row in zip(in_order, axes, strict=True):
         ji.plot.effect_signature(f"{name} ({CATALOGUE[name].site})", found[name], regressors, axes=row)

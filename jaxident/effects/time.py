@@ -30,7 +30,7 @@ ENTRIES = (
           "run-in and wear of gears; Olsson et al. 1998, Eur. J. Control 4"),
     Entry("payload_change", "time", "[v, w]' -> [v, w]' / r from the session time t_c on",
           (Parameter("ratio", "", 1.0, (0.5, 3.0), 1.5, least=0.0, above=True),
-           Parameter("instant", "s", 0.0, (0.0, 1000.0), 3.0, shape=True)), BOTH, (),
+           Parameter("instant", "s", 0.0, (0.0, 1000.0), 1.0, shape=True)), BOTH, (),
           "Newton's second law; Basseville, Nikiforov 1993, Detection of Abrupt Changes"),
 )  # fmt: skip
 """Rows of the catalogue for this site."""
