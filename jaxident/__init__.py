@@ -25,10 +25,11 @@ _HOMES = {
     "Model": "jaxident.robot.model",
     "Physical": "jaxident.robot.drive",
     "Difference": "jaxident.robot.difference",
+    "Effect": "jaxident.robot.model",
     "Noise": "jaxident.robot.noise",
     "to_difference": "jaxident.robot.difference",
     "to_physical": "jaxident.robot.difference",
-    "simulate": "jaxident.robot.simulate",
+    "simulate": "jaxident.effects.simulate",
     "path_length": "jaxident.robot.path_length",
     "EXCITATIONS": "jaxident.robot.excitation",
     "identify": "jaxident.estimation.identify",
@@ -39,7 +40,11 @@ _HOMES = {
     "load_model": "jaxident.files.models",
     "save_model": "jaxident.files.models",
 }
-_ROOMS = {"recursive": "jaxident.estimation.recursive", "plot": "jaxident.plot"}
+_ROOMS = {
+    "recursive": "jaxident.estimation.recursive",
+    "effects": "jaxident.effects",
+    "plot": "jaxident.plot",
+}
 
 __all__ = ["__version__", *_HOMES, *_ROOMS]
 

@@ -11,11 +11,13 @@ from jaxident.start import start_jax
 
 @click.command()
 @click.option("--out", default="example", show_default=True, metavar="DIR", help="The folder to write.")
+@click.option("--effect", metavar="NAME", help="Of the catalogue (`jaxident effects`), or `none`; else drawn.")
 @seed_option
-def command(out, seed):
+def command(out, effect, seed):
     """Small example logs of a simulated robot: six runs of 1000 rows with camera noise.
 
-    The robot is drawn near the published one; what it was is kept in DIR/.answer.json, a model file.
+    The robot is drawn near the published one, and so is the size of the effect that it has beyond the nominal model;
+    what they were is kept in DIR/.answer.json, a model file.
 
     Example: jaxident example --out example && jaxident identify example
     """
@@ -25,12 +27,13 @@ def command(out, seed):
     from jaxident.files.atomic import make_folder
     from jaxident.files.logs import write_log
     from jaxident.files.models import load_model, save_model
-    from jaxident.study.example import example_robot, example_runs
+    from jaxident.study.example import draw_effect, example_robot, example_runs
 
-    make_folder(out)
     key_robot, key_runs = jax.random.split(jax.random.key(seed))
+    robot = example_robot(key_robot, load_model("published"))
+    robot = draw_effect(jax.random.fold_in(key_robot, 1), robot, effect)
+    make_folder(out)
     with working("simulating"):
-        robot = example_robot(key_robot, load_model("published"))
         runs = example_runs(key_runs, robot)
     for number, run in enumerate(runs, start=1):
         path = os.path.join(out, f"real_{number}.csv")

@@ -11,6 +11,7 @@ COMMANDS = {
     "reproduce": "The paper's robot, excitation and method, beside its published table.",
     "example": "Write small example logs of a simulated robot.",
     "simulate": "Synthetic logs from a model.",
+    "effects": "The catalogue of what real robots do beyond the model.",
     "convert": "Two streams, commands and poses, to one log.",
     "identify": "The model behind one or several logs.",
     "predict": "Free-run prediction of a log by a model.",

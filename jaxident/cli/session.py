@@ -12,7 +12,32 @@ json_option = click.option("--json", "json_file", metavar="FILE", help="Also wri
 seed_option = click.option("--seed", default=0, show_default=True, help="Makes every random result repeatable.")
 
 
-def write_json(content: dict[str, Any], path: str | None) -> None:
+class EffectOption(click.ParamType):
+    """NAME:key=value,...: an effect of the catalogue and its parameters."""
+
+    name = "NAME:key=value,..."
+
+    def convert(self, value, param, ctx):
+        """The name and a dict of numbers; a parameter that is not given keeps its neutral value."""
+        name, _, listed = value.partition(":")
+        parameters = {}
+        for part in filter(None, listed.split(",")):
+            key, equals, number = part.partition("=")
+            try:
+                parameters[key.strip()] = float(number)
+            except ValueError:
+                equals = ""
+            if not equals:
+                self.fail(f"{value!r}: {part!r} is not key=value with a number, as in delay=0.05", param, ctx)
+        if not parameters:
+            self.fail(f"{value!r} has no parameter; an effect is given as in transport_delay:delay=0.05", param, ctx)
+        return name.strip(), parameters
+
+
+effect_option = click.option("--effect", "effects", type=EffectOption(), multiple=True, help="Repeatable.")
+
+
+def write_json(content: Any, path: str | None) -> None:
     """The result as JSON, whole or not at all; nothing without a path."""
     if path:
         write_text(path, json.dumps(content, indent=2, allow_nan=False) + "\n")

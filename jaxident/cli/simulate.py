@@ -3,7 +3,7 @@
 import click
 
 from jaxident.cli.progress import working
-from jaxident.cli.session import seed_option, wrote
+from jaxident.cli.session import effect_option, seed_option, wrote
 from jaxident.start import start_jax
 
 EXCITATION_NAMES = ("staircase", "multilevel", "prbs", "multisine", "chirp")
@@ -32,15 +32,18 @@ class Noise(click.ParamType):
 @click.option("--samples", type=click.IntRange(2), help="Length of the excitation, in rows.")
 @click.option("--amplitude", type=click.FloatRange(0, min_open=True), default=1.0, show_default=True)
 @click.option("--hold", type=click.IntRange(1), default=20, show_default=True, help="Samples that a level lasts.")
+@effect_option
 @click.option("--noise", type=Noise(), help="Camera noise in metres and radians; without it the log is noise-free.")
 @click.option("--out", required=True, metavar="LOG", help="The log to write (.csv or .csv.gz).")
 @seed_option
-def command(model, inputs, excitation, samples, amplitude, hold, noise, out, seed):
+def command(model, inputs, excitation, samples, amplitude, hold, effects, noise, out, seed):
     """A synthetic log of MODEL, a model file or `published`.
 
-    Random slip and the noise's correlation time come from the model file, and count only with --noise.
+    Random slip and the noise's correlation time come from the model file, and count only with --noise. Effects join
+    those of the model file, in whose place they stand where both have one; `jaxident effects` lists them.
 
-    Example: jaxident simulate published --excitation staircase --samples 2000 --noise 0.001,0.01 --out log.csv
+    Example: jaxident simulate published --excitation staircase --samples 2000 --noise 0.001,0.01
+    --effect transport_delay:delay=0.05 --out log.csv
     """
     if (inputs is None) == (excitation is None):
         raise click.UsageError("give either --inputs LOG or --excitation NAME")
@@ -49,11 +52,12 @@ def command(model, inputs, excitation, samples, amplitude, hold, noise, out, see
     start_jax()
     import jax
 
+    from jaxident.effects.apply import with_effects
     from jaxident.files.logs import read_log, write_log
     from jaxident.files.models import load_model
     from jaxident.study.synthetic import excite, simulate_runs
 
-    robot = load_model(model)
+    robot = with_effects(load_model(model), effects)
     key_input, key_noise = jax.random.split(jax.random.key(seed))
     with working("simulating"):
         if inputs is None:

@@ -8,6 +8,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from jaxident.effects.catalogue import CATALOGUE
+from jaxident.effects.checks import check_parameters
 from jaxident.errors import InputError
 from jaxident.files.schema import Shape, take_array, take_keys, take_list, take_number, take_object, take_text
 from jaxident.robot.drive import Physical
@@ -68,7 +70,17 @@ def read_effects(value: Any, where: str, known: Collection[str]) -> tuple[Effect
             raise InputError(f"{where}[{k}].name: unknown effect {name!r}; known are: {catalogue}")
         if name in names[:k]:
             raise InputError(f"{where}[{k}].name: effect {name!r} stands twice; keep one")
+        if name in CATALOGUE:
+            _check_values(effects[k], f"{where}[{k}].parameters")
     return effects
+
+
+def _check_values(effect: Effect, where: str) -> None:
+    """What the catalogue says of the effect's parameters."""
+    try:
+        check_parameters(CATALOGUE[effect.name], effect.parameters)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
 
 
 def _read_effect(value: Any, where: str) -> Effect:

@@ -15,6 +15,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxident.effects.catalogue import CATALOGUE
 from jaxident.errors import InputError
 from jaxident.files.atomic import Target, write_text
 from jaxident.files.json_text import format_json, parse_json, read_json
@@ -51,10 +52,11 @@ _FREE = ("noise", "effects", "standard_deviation", "covariance", "provenance")
 _compiled_image = jax.jit(to_difference)
 
 
-def load_model(path: Source, known_effects: Collection[str] = ()) -> Model:
+def load_model(path: Source, known_effects: Collection[str] = tuple(CATALOGUE)) -> Model:
     """The model in a file, or a shipped robot by its name (`SHIPPED`).
 
-    `known_effects` are the names that the file's effects may have. InputError names the file and the key at fault.
+    `known_effects` are the names that the file's effects may have, those of the catalogue unless told otherwise.
+    InputError names the file and the key at fault.
     """
     name = os.fspath(path)
     if os.path.exists(path):
@@ -93,7 +95,7 @@ def model_to_dict(model: Model) -> dict[str, Any]:
     return content
 
 
-def model_from_dict(content: Any, known_effects: Collection[str] = (), name: str = "model") -> Model:
+def model_from_dict(content: Any, known_effects: Collection[str] = tuple(CATALOGUE), name: str = "model") -> Model:
     """The model that a file's content describes; `name` is what error lines call the file.
 
     The keys from noise on may be left out: none. InputError for an unknown or missing key and for a value of a wrong

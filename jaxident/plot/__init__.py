@@ -16,6 +16,7 @@ _HOMES = {
     "convergence": "estimates",
     "tracking": "estimates",
     "error_against_noise": "estimates",
+    "effect_signature": "effects",
     "figure": "style",
     "image": "output",
     "save": "output",

@@ -69,10 +69,16 @@ def force(physical: Physical, passed: Wheels) -> Force:
 
 def hold(physical: Physical, step: Array) -> Hold:
     """The exact solution over a step [s]; a step of shape (samples,) gives weights (samples,), one set per row."""
-    responses = _diagonal_responses if physical.coupling is None else _coupled_responses
-    parts = jnp.asarray((*GAUSS_NODES, 1.0)).reshape(-1, *[1] * jnp.ndim(step))
-    *nodes, (v, w, turn) = _split(responses(physical, parts * step), len(parts))
+    *nodes, (v, w, turn) = responses(physical, step, (*GAUSS_NODES, 1.0))
     return Hold(step, v, w, turn, tuple(n[0] for n in nodes), tuple(n[2] for n in nodes))
+
+
+def responses(physical: Physical, step: Array, parts: tuple[float, ...]) -> list[tuple[Response, Response, Response]]:
+    """The exact responses of v, w and turn after each of the `parts` of a step [s]: a list of triples, one per part,
+    each weight of the step's shape."""
+    solve = _diagonal_responses if physical.coupling is None else _coupled_responses
+    times = jnp.asarray(parts).reshape(-1, *[1] * jnp.ndim(step)) * step
+    return _split(solve(physical, times), len(parts))
 
 
 def _split(stacked, count: int) -> list:
@@ -90,19 +96,20 @@ def advance(state: State, pull: Force, solution: Hold) -> State:
     along_x: Any = 0.0
     along_y: Any = 0.0
     for weight, node_v, node_turn in zip(GAUSS_WEIGHTS, solution.node_v, solution.node_turn, strict=True):
-        sine, cosine = sin_cos(state.theta + _weigh(node_turn, start))
-        v = _weigh(node_v, start)
+        sine, cosine = sin_cos(state.theta + weigh(node_turn, start))
+        v = weigh(node_v, start)
         along_x, along_y = along_x + weight * v * cosine, along_y + weight * v * sine
     return State(
         state.x + solution.step * along_x,
         state.y + solution.step * along_y,
-        state.theta + _weigh(solution.turn, start),
-        _weigh(solution.v, start),
-        _weigh(solution.w, start),
+        state.theta + weigh(solution.turn, start),
+        weigh(solution.v, start),
+        weigh(solution.w, start),
     )
 
 
-def _weigh(response: Response, start: tuple) -> Array:
+def weigh(response: Response, start: tuple) -> Array:
+    """The response to what a step starts with, `start` (v, w, force along, force in heading)."""
     return sum(weight * value for weight, value in zip(response, start, strict=True) if weight is not None)
 
 
@@ -120,21 +127,25 @@ def _diagonal_responses(physical: Physical, time: Array) -> tuple[Response, Resp
 def _coupled_responses(physical: Physical, time: Array) -> tuple[Response, Response, Response]:
     """v, w and turn after `time` with coupling: exp(A t), its integral P and its double integral Q over [0, t].
 
-    Taylor series at t / 2^12, then doubling: exp(2s) = E E, P(2s) = P + E P, Q(2s) = Q + s P + E Q (scaling and
-    squaring, Higham 2008, chapter 10). Plain arithmetic on 2 x 2 entries maps over any shape; batched calls of the
+    Taylor series at t / 2^12, then doubling: P(2s) = P + E P, Q(2s) = Q + s P + E Q (scaling and squaring, Higham
+    2008, chapter 10). E is kept as D = E - 1, doubled by D(2s) = 2 D + D D: next to 1 its digits would be lost, and
+    every doubling doubles that loss. Plain arithmetic on 2 x 2 entries maps over any shape; batched calls of the
     library's matrix exponential do not, and stall on the CPU.
     """
     rate, coupling = physical.rate, physical.coupling
     s = time / 2.0**DOUBLINGS
-    decay, once, twice = _exponential_series(((-rate[0] * s, coupling[0] * s), (coupling[1] * s, -rate[1] * s)))
-    once, twice = _scale(s, once), _scale(s * s, twice)
+    system = ((-rate[0] * s, coupling[0] * s), (coupling[1] * s, -rate[1] * s))
+    once, twice = _exponential_series(system)
+    change, once, twice = _multiply(system, once), _scale(s, once), _scale(s * s, twice)
 
     def double(_, now):
-        decay, once, twice, s = now
-        twice = _add(_add(twice, _scale(s, once)), _multiply(decay, twice))
-        return _multiply(decay, decay), _add(once, _multiply(decay, once)), twice, 2.0 * s
+        change, once, twice, s = now
+        twice = _add(_add(_scale(2.0, twice), _scale(s, once)), _multiply(change, twice))
+        once = _add(_scale(2.0, once), _multiply(change, once))
+        return _add(_scale(2.0, change), _multiply(change, change)), once, twice, 2.0 * s
 
-    decay, once, twice, _ = jax.lax.fori_loop(0, DOUBLINGS, double, (decay, once, twice, s))
+    change, once, twice, _ = jax.lax.fori_loop(0, DOUBLINGS, double, (change, once, twice, s))
+    decay = (change[0][0] + 1.0, change[0][1]), (change[1][0], change[1][1] + 1.0)
     return (
         Response(*decay[0], *once[0]),
         Response(*decay[1], *once[1]),
@@ -143,16 +154,16 @@ def _coupled_responses(physical: Physical, time: Array) -> tuple[Response, Respo
 
 
 def _exponential_series(matrix: Matrix) -> list[Matrix]:
-    """sum over k of matrix^k / (k + j)! for j = 0, 1, 2, by Horner's rule."""
-    weights = jnp.array([[1.0 / math.factorial(k + j) for j in range(3)] for k in range(TERMS)])
-    weights = weights.reshape(TERMS, 3, *[1] * jnp.ndim(matrix[0][0]))
-    zero = jnp.zeros((3, *jnp.shape(matrix[0][0])))
+    """sum over k of matrix^k / (k + j)! for j = 1, 2, by Horner's rule."""
+    weights = jnp.array([[1.0 / math.factorial(k + j) for j in (1, 2)] for k in range(TERMS)])
+    weights = weights.reshape(TERMS, 2, *[1] * jnp.ndim(matrix[0][0]))
+    zero = jnp.zeros((2, *jnp.shape(matrix[0][0])))
 
     def add_term(k, total):
         weight, total = weights[TERMS - 1 - k], _multiply(matrix, total)
         return (total[0][0] + weight, total[0][1]), (total[1][0], total[1][1] + weight)
 
-    return _split(jax.lax.fori_loop(0, TERMS, add_term, ((zero, zero), (zero, zero))), 3)
+    return _split(jax.lax.fori_loop(0, TERMS, add_term, ((zero, zero), (zero, zero))), 2)
 
 
 def _multiply(a: Matrix, b: Matrix) -> Matrix:

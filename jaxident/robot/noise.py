@@ -58,8 +58,7 @@ def observe(pose: Pose, noise: Noise, unit: UnitNoise, step: Array) -> Pose:
     """What the camera reports of poses (samples,); step [s] scalar, or (samples - 1,) between the rows."""
     error = Pose(unit.x, unit.y, unit.theta)
     if noise.correlation_time is not None:
-        memory = jnp.exp(-jnp.broadcast_to(step, (len(unit.x) - 1,)) / noise.correlation_time)
-        error = Pose(*(_autoregression(draw, memory) for draw in error))
+        error = Pose(*(correlated(draw, step, noise.correlation_time) for draw in error))
     return Pose(
         pose.x + noise.position * error.x,
         pose.y + noise.position * error.y,
@@ -67,8 +66,10 @@ def observe(pose: Pose, noise: Noise, unit: UnitNoise, step: Array) -> Pose:
     )
 
 
-def _autoregression(unit: Array, memory: Array) -> Array:
-    """Stationary first-order autoregression of unit variance; memory (samples - 1,) is the correlation per step."""
+def correlated(unit: Array, step: Array, time: Array) -> Array:
+    """Stationary first-order autoregression of unit variance from unit noise (samples,), its correlation time in
+    seconds; step [s] scalar, or (samples - 1,) between the rows."""
+    memory = jnp.exp(-jnp.broadcast_to(step, (len(unit) - 1,)) / time)
 
     def advance(last, now):
         correlation, draw = now

@@ -24,7 +24,7 @@ def simulate(model: Model, log: Log, *, start: State = AT_REST, key: Array | Non
     """
     if model.effects:
         raise InputError(f"effect {model.effects[0].name!r}: this simulator runs nominal models only")
-    _check_one_run(log)
+    check_one_run(log)
     if not isinstance(model.dynamics, Physical):
         check_period(model, log)
     pose = _poses(model, log.t, log.command, start, None if model.noise is None else key)
@@ -105,7 +105,7 @@ def check_period(model: Model, log: Log) -> None:
         )
 
 
-def _check_one_run(log: Log) -> None:
+def check_one_run(log: Log) -> None:
     """InputError for a log of several runs; traced run numbers pass."""
     if isinstance(log.run, jax.core.Tracer):
         return

@@ -1,14 +1,19 @@
 """Example logs: a robot drawn near the published one, recorded by an overhead camera."""
 
 import dataclasses
+import math
 
 import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array
-from jaxident.log import Log
+from jaxident.effects.apply import with_effects
+from jaxident.effects.catalogue import CATALOGUE
+from jaxident.effects.checks import check_effects
+from jaxident.effects.entry import Parameter
+from jaxident.log import Log, join
 from jaxident.robot.drive import Physical
-from jaxident.robot.model import Model, Provenance, require_physical
+from jaxident.robot.model import Effect, Model, Provenance, require_physical
 from jaxident.robot.noise import Noise
 from jaxident.study.synthetic import excite, simulate_runs
 
@@ -39,12 +44,32 @@ def example_robot(key: Array, published: Model) -> Model:
     )
 
 
+def draw_effect(key: Array, robot: Model, name: str | None) -> Model:
+    """The robot with an effect of the catalogue between half and one and a half times its typical size; `none` leaves
+    it as it is, None draws the effect too. InputError for an unknown name."""
+    key_name, key_size = jax.random.split(key)
+    if name is None:
+        canonical = [entry.name for entry in CATALOGUE.values() if not entry.extension]
+        name = canonical[int(jax.random.randint(key_name, (), 0, len(canonical)))]
+    if name == "none":
+        return robot
+    check_effects((Effect(name, {}),))
+    entry = CATALOGUE[name]
+    factor = float(jax.random.uniform(key_size, minval=0.5, maxval=1.5))
+    sizes = {p.name: p.typical if p.shape else _scaled(p, factor) for p in entry.parameters}
+    return with_effects(robot, [(name, sizes)])
+
+
+def _scaled(parameter: Parameter, factor: float) -> float:
+    """A typical size, its distance from neutral times a factor; where neutral is infinite, the size over it."""
+    if math.isinf(parameter.neutral):
+        return parameter.typical / factor
+    return parameter.neutral + factor * (parameter.typical - parameter.neutral)
+
+
 def example_runs(key: Array, robot: Model) -> list[Log]:
     """Runs with camera noise: multi-level commands for one half, the staircase for the other."""
-    runs = []
-    for number, k in enumerate(jax.random.split(key, RUNS)):
-        key_input, key_noise = jax.random.split(k)
-        kind = ("multilevel", "staircase")[number % 2]
-        commands = excite(key_input, kind, SAMPLES, robot.sample_period)
-        runs.append(simulate_runs(robot, commands, noise=CAMERA, key=key_noise))
-    return runs
+    key_noise, *keys = jax.random.split(key, RUNS + 1)
+    kinds = [("multilevel", "staircase")[number % 2] for number in range(RUNS)]
+    parts = [excite(k, kind, SAMPLES, robot.sample_period) for k, kind in zip(keys, kinds, strict=True)]
+    return simulate_runs(robot, join(parts), noise=CAMERA, key=key_noise).runs()

@@ -6,11 +6,11 @@ import jax
 import numpy as np
 
 from jaxident.array_types import Array
+from jaxident.effects.simulate import is_random, simulate
 from jaxident.log import Log, join, make_log
 from jaxident.robot.excitation import EXCITATIONS
 from jaxident.robot.model import Model
 from jaxident.robot.noise import Noise
-from jaxident.robot.simulate import simulate
 
 
 def excite(key: Array, name: str, samples: int, period: float, *, amplitude: float = 1.0, hold: int = 20) -> Log:
@@ -23,11 +23,18 @@ def simulate_runs(model: Model, log: Log, *, noise: tuple[float, float] | None =
     """The log with every run's poses replaced by the model's, from rest at the origin.
 
     noise (position [m], heading [rad]) adds camera noise of that size, with the correlation time and the random slip
-    of the model's own noise law; without it the poses are exact.
+    of the model's own noise law; without it the poses are exact but for the model's random effects. Effects that
+    drift go on from run to run.
     """
     if noise is not None:
         law = model.noise or Noise()
         model = dataclasses.replace(model, noise=law._replace(position=noise[0], heading=noise[1]))
-    keys = jax.random.split(key, len(log.runs()))
-    runs = [simulate(model, run, key=k if noise else None) for run, k in zip(log.runs(), keys, strict=True)]
+    else:
+        model = dataclasses.replace(model, noise=None)
+    parts, draws = log.runs(), noise is not None or is_random(model)
+    ends = np.cumsum([run.t[-1] - run.t[0] for run in parts])
+    runs = [
+        simulate(model, run, key=k if draws else None, session_time=begin)
+        for run, k, begin in zip(parts, jax.random.split(key, len(parts)), [0.0, *ends[:-1]], strict=True)
+    ]
     return join([Log(*(np.asarray(column) for column in run)) for run in runs])._replace(run=log.run)

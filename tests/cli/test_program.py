@@ -144,3 +144,45 @@ def test_convert(tmp_path):
     log = read_log(tmp_path / "log.csv")
     np.testing.assert_allclose(log.t, [0, 0.01, 0.49, 0.5])
     np.testing.assert_allclose(log.u_r[-1], 0.12)
+
+
+def test_effects_prints_and_writes_the_catalogue(tmp_path):
+    result = jaxident("effects", "--json", tmp_path / "c.json")
+    assert result.returncode == 0, result.stderr
+    rows = json.loads((tmp_path / "c.json").read_text())
+    assert {"name", "site", "equation", "parameters", "confused_with", "extension"} <= rows[0].keys()
+    assert all(row["name"] in result.stdout for row in rows)
+    assert {"name": "level", "unit": "unit", "neutral": None, "range": [0.3, 1.0]} in [
+        parameter for row in rows for parameter in row["parameters"]
+    ]
+
+
+def test_simulate_with_effects(tmp_path):
+    words = ("simulate", "published", "--excitation", "multilevel", "--samples", 60)
+    effects = ("--effect", "transport_delay:delay=0.05", "--effect", "coulomb_friction:right=0.05,left=0.04")
+    for name, more in (("plain.csv", ()), ("with.csv", effects)):
+        result = jaxident(*words, *more, "--out", tmp_path / name)
+        assert result.returncode == 0, result.stderr
+    plain, other = (read_log(tmp_path / name) for name in ("plain.csv", "with.csv"))
+    assert np.abs(plain.theta - other.theta).max() > 0.1
+    for effect, said in (
+        ("gearbox:x=1", "unknown effect 'gearbox'"),
+        ("transport_delay:lag=1", "it has delay [s]"),
+        ("transport_delay:delay=60", "longer than the log"),
+        ("input_saturation:level=0", "above 0 unit"),
+        ("transport_delay:delay=long", "key=value"),
+        ("transport_delay", "no parameter"),
+    ):
+        refused(jaxident(*words, "--effect", effect, "--out", tmp_path / "bad.csv"), said)
+    assert not (tmp_path / "bad.csv").exists()
+
+
+def test_example_keeps_its_effect_in_the_answer(tmp_path):
+    result = jaxident("example", "--effect", "motor_lag", "--out", tmp_path / "a")
+    assert result.returncode == 0, result.stderr
+    (effect,) = load_model(tmp_path / "a" / ".answer.json").effects
+    assert effect.name == "motor_lag"
+    assert 0.02 < effect.parameters["time_constant"] < 0.1
+    assert len(list((tmp_path / "a").glob("real_*.csv"))) == 6
+    refused(jaxident("example", "--effect", "gearbox", "--out", tmp_path / "b"), "unknown effect 'gearbox'")
+    assert not (tmp_path / "b").exists()

@@ -323,3 +323,15 @@ def test_json_reads_back_as_it_was_written(value):
 def test_json_cannot_hold_what_is_not_finite():
     with pytest.raises(ValueError, match="not JSON compliant"):
         format_json([1.0, math.nan])
+
+
+def test_effects_of_the_catalogue_are_checked_against_it():
+    found = content() | {"effects": [{"name": "motor_lag", "parameters": {"time_constant": 0.1}}]}
+    assert model_from_dict(found).effects[0].parameters == {"time_constant": 0.1}
+    for parameters, reason in (
+        ({"tau": 0.1}, r"effects\[0\].parameters: effect 'motor_lag': unknown parameter 'tau'; it has time_constant"),
+        ({"time_constant": -1}, r"time_constant is -1; at least 0 s"),
+    ):
+        found["effects"][0]["parameters"] = parameters
+        with pytest.raises(InputError, match=reason):
+            model_from_dict(found)

@@ -1,0 +1,54 @@
+"""`ji.simulate`: the nominal program for a model without effects, the full one for a model with."""
+
+import jax
+import numpy as np
+
+from jaxident.array_types import AT_REST, Array, Pose, State
+from jaxident.effects.catalogue import CATALOGUE, to_vector
+from jaxident.effects.checks import check_delay, check_effects
+from jaxident.effects.full import SUBSTEPS, run_full
+from jaxident.log import Log
+from jaxident.robot import simulate as nominal
+from jaxident.robot.model import Model, require_physical
+
+SHARP_SUBSTEPS = 16
+"""Per interval where an effect has corners within a sample (friction, stiction, play, slew, the |w| of turn_loss)."""
+
+SHARP = ("turn_loss", "coulomb_friction", "stiction", "backlash", "input_rate_limit")
+
+
+def simulate(
+    model: Model, log: Log, *, start: State = AT_REST, key: Array | None = None, session_time: Array = 0.0
+) -> Log:
+    """The log that `model` would have produced under the commands and times of `log` (one run, all arrays (samples,)).
+
+    Noise-free without a key; with one, slip and camera noise are drawn by the model's noise law, and its random effects
+    act. session_time [s]: at the first row, for effects that drift. Steps may differ for a physical model; a model
+    of free numerators takes no effects and refuses a log of another or an uneven period. InputError for these, for a
+    log of several runs, and for effects that `check_effects` refuses. Differentiable in the model and the start.
+    """
+    if not model.effects:
+        return nominal.simulate(model, log, start=start, key=key)
+    check_effects(model.effects)
+    nominal.check_one_run(log)
+    require_physical(model)
+    if not isinstance(log.t, jax.core.Tracer):
+        t = np.asarray(log.t)
+        check_delay(model.effects, float(t[-1] - t[0]))
+    sharp = any(effect.name in SHARP for effect in model.effects)
+    vector = to_vector(model.effects)
+    pose = _poses(model.dynamics, model.dead_zone, vector, log, start, model.noise, key, session_time,
+                  substeps=SHARP_SUBSTEPS if sharp else SUBSTEPS)  # fmt: skip
+    return log._replace(x=pose.x, y=pose.y, theta=pose.theta)
+
+
+def is_random(model: Model) -> bool:
+    """Whether one of the model's effects needs a key to act."""
+    return any(CATALOGUE[effect.name].random for effect in model.effects)
+
+
+@jax.jit(static_argnames="substeps")
+def _poses(drive, dead_zone, vector, log: Log, start, noise, key, session_time, *, substeps: int) -> Pose:
+    command = log.command
+    return run_full(drive, dead_zone, vector, log.t, command, start, noise=noise, key=key, session_time=session_time,
+                    substeps=substeps)  # fmt: skip
