@@ -37,8 +37,11 @@ _HOMES = {
     "write_log": "jaxident.files.logs",
     "load_model": "jaxident.files.models",
     "save_model": "jaxident.files.models",
+    "read_study": "jaxident.files.studies",
+    "summarise": "jaxident.study.statistics",
+    "Study": "jaxident.study.design",
 }
-_ROOMS = {"recursive": "jaxident.estimation.recursive", "plot": "jaxident.plot"}
+_ROOMS = {"study": "jaxident.study", "recursive": "jaxident.estimation.recursive", "plot": "jaxident.plot"}
 
 __all__ = ["__version__", *_HOMES, *_ROOMS]
 
