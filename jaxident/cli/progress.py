@@ -57,8 +57,12 @@ def counting(unit: str, stream: TextIO | None = None) -> Iterator[Counter]:
         hidden = not stream.isatty()
         bars.append(tqdm(total=total, initial=done, unit=f" {unit}", file=stream, leave=False, disable=hidden))
 
+    def advance(count: int) -> None:
+        for bar in bars:
+            bar.update(count)
+
     try:
-        yield Counter(begin, lambda count: [bar.update(count) for bar in bars] and None)
+        yield Counter(begin, advance)
     finally:
         for bar in bars:
             bar.close()

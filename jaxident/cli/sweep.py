@@ -59,8 +59,8 @@ def _run_all(plan, out, scheduler):
         summary = summarise(trials)
         paths = [write_summary(summary, os.path.join(out, "summary.csv"))]
         paths += write_study(plan, trials, summary, os.path.join(out, "index.html"))
-    for path in paths:
-        wrote(path)
+    for name in paths:
+        wrote(name)
     failed = int(summary["failures"].sum())
     click.echo(f"{plan.trials} trials, {len(plan.estimators)} estimators, {failed} failed estimates")
 

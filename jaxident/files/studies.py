@@ -116,7 +116,7 @@ def _candidates(entry: Any, where: str, folder: str) -> list[Candidate]:
     spread = take_keys(found["spread"] or {}, f"{where}: spread", (), PARTS)
     widths = tuple(0.0 if v is None else take_number(v, f"{where}: spread.{key}") for key, v in spread.items())
     grid = {
-        key: _axis(value if isinstance(value, list) else [value], take_number, f"{where}: scale.{key}")
+        key: _axis(value if isinstance(value, list) else [value], take_number, f"{where}: scale.{key}") or ()
         for key, value in scale.items()
         if value is not None
     }

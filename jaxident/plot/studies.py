@@ -59,9 +59,7 @@ def error_curves(
     return ax
 
 
-def heat_map(
-    values: Any, *, rows: Sequence[str], columns: Sequence[str], label: str, ax: Axes | None = None
-) -> Axes:
+def heat_map(values: Any, *, rows: Sequence[str], columns: Sequence[str], label: str, ax: Axes | None = None) -> Axes:
     """Positive values (rows, columns) as colours on a logarithmic scale, each written into its field; NaN is empty.
 
     label: what the values are, with their unit, above the map.

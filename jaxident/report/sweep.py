@@ -140,7 +140,7 @@ def _map(values: Any, rows: list[str], columns: list[str], label: str) -> Figure
 def _histogram(study: Study, trials: xarray.Dataset, summary: xarray.Dataset, name: str) -> Figure:
     """The errors of a parameter in the first cell, at the middle noise level."""
     middle = len(study.noise) // 2
-    cut = tuple(middle if axis == "noise" else 0 for axis in CELLS) + (slice(0, HISTOGRAM_TRIALS),)
+    cut = (*(middle if axis == "noise" else 0 for axis in CELLS), slice(0, HISTOGRAM_TRIALS))
     column = DIFFERENCE_ORDER.index(name)
     truth = np.asarray(trials["truth"].variable[(*cut, column)])
     estimates = np.asarray(trials["estimate"].variable[(*cut, slice(None), column)])
@@ -206,8 +206,14 @@ def draw_trial(study: Study, number: int, recording: Recording, outcome: Outcome
 
 def _title(study: Study, number: int) -> str:
     index = np.unravel_index(number, study.shape)
-    entries = (study.excitations, study.samples, [one.name for one in study.robots], study.period, study.amplitude)
-    values = [axis[k] for axis, k in zip(entries, index, strict=False)]
+    entries: tuple[Any, ...] = (
+        study.excitations,
+        study.samples,
+        [one.name for one in study.robots],
+        study.period,
+        study.amplitude,
+    )
+    values = [axis[int(k)] for axis, k in zip(entries, index, strict=False)]
     return (
         f"trial {number}: {values[0]}, {values[1]} rows, {values[2]}, {values[3]:.4g} s, amplitude {values[4]:g},\n"
         f"camera noise {1e3 * study.noise[index[5]]:.4g} mm, seed {index[6]}"

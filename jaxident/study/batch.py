@@ -8,9 +8,7 @@ from typing import Any
 import jax
 
 
-def in_parallel(
-    function: Callable[..., Any], blocks: Sequence[tuple[Any, ...]], cores: int | None = None
-) -> list[Any]:
+def in_parallel(function: Callable[..., Any], blocks: Sequence[tuple[Any, ...]], cores: int | None = None) -> list[Any]:
     """The results of a compiled function on blocks of arguments, all of one shape, in their order.
 
     One thread per core (`cores`: how many, all by default) takes the next block when it is done with one. The program

@@ -27,7 +27,7 @@ class Candidate(NamedTuple):
 
     name: str
     model: Model
-    spread: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    spread: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
 
 
 class Study(NamedTuple):

@@ -31,7 +31,7 @@ _KINDS = tuple(EXCITATIONS)
 class Piece(NamedTuple):
     """A part of an array: a slice per axis."""
 
-    cut: tuple[slice, ...]
+    cut: tuple[Any, ...]
 
     @property
     def shape(self) -> tuple[int, ...]:

@@ -120,8 +120,8 @@ def estimate(choice: Choice, sight: Sight, moves: Array) -> Finding:
     finite = jnp.all(jnp.isfinite(found.estimate))
     reason = jnp.where(found.reason != FOUND, found.reason, jnp.where(finite, FOUND, NOT_FINITE))
     reason = jnp.where(moves, reason, AT_REST).astype(jnp.int8)
-    numbers = (jnp.where(reason == FOUND, part, jnp.nan) for part in (found.estimate, found.deviation))
-    return Finding(*numbers, reason)
+    value, deviation = (jnp.where(reason == FOUND, part, jnp.nan) for part in (found.estimate, found.deviation))
+    return Finding(value, deviation, reason)
 
 
 def batch(sight: Sight, settings: dict[str, Any]) -> Finding:

@@ -126,7 +126,7 @@ def breakdown(summary: xarray.Dataset) -> xarray.DataArray:
     return first.assign_attrs(units="m", long_name="lowest camera noise that breaks the estimator")
 
 
-def _parts(shape: tuple[int, ...], seeds: int) -> list[tuple[slice, ...]]:
+def _parts(shape: tuple[int, ...], seeds: int) -> list[tuple[Any, ...]]:
     """Cells read together: whole axes from the last one on."""
     room, sizes = max(1, NUMBERS // (12 * seeds)), []
     for length in reversed(shape):
