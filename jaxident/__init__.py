@@ -39,10 +39,14 @@ _HOMES = {
     "write_log": "jaxident.files.logs",
     "load_model": "jaxident.files.models",
     "save_model": "jaxident.files.models",
+    "read_study": "jaxident.files.studies",
+    "summarise": "jaxident.study.statistics",
+    "Study": "jaxident.study.design",
 }
 _ROOMS = {
     "recursive": "jaxident.estimation.recursive",
     "effects": "jaxident.effects",
+    "study": "jaxident.study",
     "plot": "jaxident.plot",
 }
 

@@ -2,9 +2,9 @@
 
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TextIO
+from typing import NamedTuple, TextIO
 
 from tqdm import tqdm
 
@@ -38,3 +38,31 @@ def working(what: str, stream: TextIO | None = None) -> Iterator[None]:
     finally:
         done.set()
         shower.join()
+
+
+class Counter(NamedTuple):
+    """begin(total, done) opens the bar, advance(count) moves it."""
+
+    begin: Callable[[int, int], None]
+    advance: Callable[[int], None]
+
+
+@contextmanager
+def counting(unit: str, stream: TextIO | None = None) -> Iterator[Counter]:
+    """A bar with rate and time left while the block runs; on a terminal only, wiped away at the end."""
+    stream = sys.stderr if stream is None else stream
+    bars: list[tqdm] = []
+
+    def begin(total: int, done: int) -> None:
+        hidden = not stream.isatty()
+        bars.append(tqdm(total=total, initial=done, unit=f" {unit}", file=stream, leave=False, disable=hidden))
+
+    def advance(count: int) -> None:
+        for bar in bars:
+            bar.update(count)
+
+    try:
+        yield Counter(begin, advance)
+    finally:
+        for bar in bars:
+            bar.close()

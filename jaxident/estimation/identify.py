@@ -156,7 +156,7 @@ def identify_recursively(log: Log, setup_rows: int, d_max: Array, forgetting: Ar
     variance = _noise_variance(info, setup)
     parameters, deviations = jax.vmap(lambda one: _summary(one, variance))(steps)
     history = History(parameters, deviations, info.used)
-    covariance = _covariance(estimate, variance)
+    covariance = parameter_covariance(estimate, variance)
     residuals = Increment(*(jnp.where(info.used, e, jnp.nan) for e in info.error))
     return estimate, setup, history, residuals, covariance
 
@@ -172,7 +172,7 @@ def _noise_variance(info: recursive.Info, setup: Setup) -> Increment:
     )
 
 
-def _covariance(estimate: recursive.Estimate, variance: Increment) -> Array:
+def parameter_covariance(estimate: recursive.Estimate, variance: Increment) -> Array:
     """Covariance (12, 12) in DIFFERENCE_ORDER: that of both equations' unknowns, carried to first order.
 
     The dead zones enter as the unbounded average: at a bound the clipped one would claim to be certain.
@@ -196,7 +196,7 @@ def _covariance(estimate: recursive.Estimate, variance: Increment) -> Array:
 
 def _summary(estimate: recursive.Estimate, variance: Increment) -> tuple[Array, Array]:
     return difference_vector(*recursive.parameters(estimate)), jnp.sqrt(
-        jnp.maximum(jnp.diagonal(_covariance(estimate, variance)), 0.0)
+        jnp.maximum(jnp.diagonal(parameter_covariance(estimate, variance)), 0.0)
     )
 
 

@@ -55,3 +55,13 @@ def observe_log(log: Log) -> Observations:
         first=rows[1:] == run_start[1:] + 1,
         inside=same_run,
     )
+
+
+def complete_observations(command: Wheels, increment: Increment) -> Observations:
+    """Observations (samples - 2, ...) of a single run without missing poses, from its second sample on.
+
+    command (samples, ...), increment (samples - 1, ...) between its poses. They carry no masks, which makes the
+    recursion faster; trials may follow on further axes.
+    """
+    now, before = (Wheels(*(u[cut] for u in command)) for cut in (slice(1, -1), slice(0, -2)))
+    return Observations(now, before, Increment(*(part[1:] for part in increment)), None, None, None, None)

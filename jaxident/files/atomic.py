@@ -24,13 +24,13 @@ _FAILED_WORK = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
 
 def check_target(path: Target) -> None:
     """InputError unless a file of this name can be written; for commands that work long before they write."""
-    with _explained(path):
+    with explained(path):
         _check(pathlib.Path(path))
 
 
 def make_folder(path: Target) -> None:
     """Make a folder and those above it where they are missing; InputError where that cannot be."""
-    with _explained(path):
+    with explained(path):
         os.makedirs(path, exist_ok=True)
 
 
@@ -62,7 +62,7 @@ def writing_bytes(path: Target) -> Iterator[BinaryIO]:
     (missing folder, no permission, a folder) and WorkError where writing fails (disk full). The block should only
     write: every OSError in it counts as one of the target.
     """
-    with _explained(path):
+    with explained(path):
         target = pathlib.Path(path)
         _check(target)
         place = _in_place if target.exists() and not target.is_file() else _renamed
@@ -114,12 +114,13 @@ def _packed(raw: BinaryIO, target: pathlib.Path) -> contextlib.AbstractContextMa
 
 
 @contextlib.contextmanager
-def _explained(path: Target) -> Iterator[None]:
-    """OSError as one line: the work failed where the disk is full or broken, the name is wrong otherwise."""
+def explained(path: Target, kept: str = "nothing was left behind") -> Iterator[None]:
+    """OSError as one line: the work failed where the disk is full or broken, and `kept` says what is left; the name
+    is wrong otherwise."""
     try:
         yield
     except OSError as error:
         reason = f"{os.fspath(path)}: cannot be written: {error.strerror or error}"
         if error.errno in _FAILED_WORK:
-            raise WorkError(f"{reason}; nothing was left behind") from error
+            raise WorkError(f"{reason}; {kept}") from error
         raise InputError(reason) from error

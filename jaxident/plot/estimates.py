@@ -83,7 +83,7 @@ def error_against_noise(
     unit, scale = LENGTH
     level = scale * np.asarray(noise, float)
     how = written(label)
-    _scale_for_levels(ax, level)
+    scale_for_levels(ax, level)
     for number, (name, values) in enumerate(estimates.items()):
         error = how.scale * (np.asarray(values, float) - truth)
         shift = 1.0 + 0.04 * (number - 0.5 * (len(estimates) - 1))
@@ -111,7 +111,7 @@ def _draw_estimator(ax: Axes, level: np.ndarray, error: np.ndarray, name: str, l
     ax.errorbar(level, bias, unsure, color=colour, elinewidth=style.THIN, capsize=2, **hollow)
 
 
-def _scale_for_levels(ax: Axes, level: np.ndarray) -> None:
+def scale_for_levels(ax: Axes, level: np.ndarray) -> None:
     """Both axes logarithmic, with room for a level of zero, and ticks at eight of the levels or fewer."""
     ax.set_yscale("log", nonpositive="clip")
     if np.any(level == 0.0):

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxident.array_types import AT_REST, Array, Increment, Pose, Wheels
+from jaxident.array_types import AT_REST, Array, Pose, Wheels
 from jaxident.estimation import recursive
 from jaxident.estimation.initialise import Setup, initialise
-from jaxident.estimation.observations import Observations, observe_log
+from jaxident.estimation.observations import Observations, complete_observations, observe_log
 from jaxident.log import Log
 from jaxident.numerics import require_float64
 from jaxident.robot.excitation import multilevel
@@ -61,19 +61,13 @@ def stages(robot: Model, key: Array) -> dict[str, float]:
 
     poses, simulate_s = _time(run, [(command,) for command in commands])
     increments, path_s = _time(path_length, [(pose,) for pose in poses])
-    observations = [_complete(*pair) for pair in zip(commands, increments, strict=True)]
+    observations = [complete_observations(*pair) for pair in zip(commands, increments, strict=True)]
     first = jax.jit(jax.vmap(lambda setup: _at(robot, setup), in_axes=-1, out_axes=-1))
     starts = [first(jax.tree.map(lambda column: column[:SETUP_ROWS], o)) for o in observations]
     _, rls_s = _time(jax.jit(recursive.run_to_end), list(zip(starts, observations, strict=True)))
     _, noise_s = _time(jax.jit(jax.vmap(lambda k: draw_noise(k, SAMPLES))), keys)
     seconds = {"simulate_ns": simulate_s, "path_length_ns": path_s, "rls_ns": rls_s, "noise_ns": noise_s}
     return {name: 1e9 * second / (TRIALS * SAMPLES) for name, second in seconds.items()}
-
-
-def _complete(command: Wheels, increment: Increment) -> Observations:
-    """Observations (samples - 2, trials) of single runs without missing poses, from the second sample on."""
-    now, before = (jax.tree.map(lambda u, cut=cut: u[cut], command) for cut in (slice(1, -1), slice(0, -2)))
-    return Observations(now, before, jax.tree.map(lambda d: d[1:], increment), None, None, None, None)
 
 
 def _at(robot: Model, setup: Observations) -> recursive.Estimate:
@@ -89,7 +83,7 @@ def trial(robot: Model, key: Array) -> tuple[Array, Array]:
     pose = run_physical(robot, command, period, AT_REST).pose
     pose = observe(pose, CAMERA, draw_noise(key_noise, TRIAL_SAMPLES), period)
     setup = start_values(command, pose, period)
-    observations = _complete(command, path_length(pose))
+    observations = complete_observations(command, path_length(pose))
     early = jax.tree.map(lambda column: column[: SETUP_ROWS - 2], observations)
     first = recursive.start(setup.difference, setup.dead_zone, early, D_MAX, 1.0)
     last = recursive.run_to_end(first, recursive.tail(observations, SETUP_ROWS - 2))

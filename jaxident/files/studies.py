@@ -1,0 +1,179 @@
+"""Study files: TOML, one key per axis. `EXAMPLE` is one, with every key explained."""
+
+import itertools
+import os
+import tomllib
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from jaxident.errors import InputError
+from jaxident.files.models import load_model
+from jaxident.files.schema import take_keys, take_list, take_number, take_object, take_text
+from jaxident.files.source import Source, explained
+from jaxident.robot.drive import Physical
+from jaxident.robot.model import Model, require_physical
+from jaxident.study.design import PARTS, Candidate, Study, check_study
+from jaxident.study.estimators import Choice
+
+EXAMPLE = """\
+# How does camera noise spoil the paper's method? Run with: jaxident sweep study.toml --out study
+
+name = "camera noise and excitation"
+seeds = 50                  # repetitions of every combination below, each with its own random numbers
+
+# Axes: every combination of their entries is run.
+excitations = ["staircase", "multilevel"]       # also prbs, multisine, chirp
+noise = [1e-6, 1e-5, 1e-4, 1e-3]                # standard deviation of the camera's position [m]
+samples = [200]                                 # rows of a run
+amplitude = [1.0]                               # largest command
+# period = [0.0333, 0.1]                        # sample period [s]; default: that of the first robot
+
+hold = 5                    # samples that a level of the excitation lasts
+heading_per_position = 10.0 # heading noise [rad] for each metre of position noise
+# correlation_time = 0.5    # of the camera's noise [s]; default: white
+# chunk = 2000              # trials that are computed and stored together: bounds the memory
+
+[[robots]]
+model = "published"         # a robot that comes with the program, or a model file
+# scale = { dead_zone = [0.5, 1.0, 2.0], rate = 1.0 }     # grid: every combination becomes a robot
+# spread = { gain = 0.2 }   # each seed draws its own robot, this far from the model at most (relative, uniform)
+                            # scale and spread take rate, gain, coupling, dead_zone
+
+[[estimators]]
+method = "batch"            # PAPER section VI
+# name = "batch, free run"  # needed where a method stands here twice
+# settings = { reading = "free_run", setup_samples = 200, d_max_share = 0.9 }
+
+[[estimators]]
+method = "recursive"        # batch on the setup time, then recursive least squares
+settings = { setup_samples = 100 }              # also forgetting
+"""
+
+_NEEDED = ("seeds", "noise", "robots", "estimators")
+_FREE = ("name", "excitations", "amplitude", "samples", "period", "hold", "heading_per_position", "correlation_time",
+         "chunk")  # fmt: skip
+
+
+def read_study(path: Source, *, seed: int = 0) -> Study:
+    """The study in a TOML file; models in it are found beside it. InputError names the file and the key at fault."""
+    name = os.fspath(path)
+    with explained(name, "TOML"), open(path, "rb") as stream:
+        text = stream.read().decode("utf-8")
+    return parse_study(text, name, seed=seed)
+
+
+def parse_study(text: str, name: str, *, seed: int = 0) -> Study:
+    """The study in a TOML text; `name` is what error lines call it, and models are found beside."""
+    try:
+        content = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{name}: not TOML: {error}") from None
+    return study_from_dict(content, name, seed=seed)
+
+
+def study_from_dict(content: Any, name: str = "study", *, seed: int = 0) -> Study:
+    """The study that the content of a study file describes."""
+    found = take_keys(content, name, _NEEDED, _FREE)
+    robots = [
+        candidate
+        for k, entry in enumerate(take_list(found["robots"], f"{name}: robots"))
+        for candidate in _candidates(entry, f"{name}: robots[{k}]", os.path.dirname(name))
+    ]
+    estimators = take_list(found["estimators"], f"{name}: estimators")
+    given = {
+        "name": _if_given(found["name"], take_text, f"{name}: name"),
+        "excitations": _axis(found["excitations"], take_text, f"{name}: excitations"),
+        "samples": _axis(found["samples"], _whole, f"{name}: samples"),
+        **{key: _axis(found[key], take_number, f"{name}: {key}") for key in ("amplitude", "period")},
+        **{key: _if_given(found[key], _whole, f"{name}: {key}") for key in ("hold", "chunk")},
+        **{
+            key: _if_given(found[key], take_number, f"{name}: {key}")
+            for key in ("heading_per_position", "correlation_time")
+        },
+    }
+    if given["period"] is None and robots:
+        given["period"] = (float(robots[0].model.sample_period),)
+    study = Study(
+        robots=tuple(robots),
+        estimators=tuple(_choice(entry, f"{name}: estimators[{k}]") for k, entry in enumerate(estimators)),
+        seeds=_whole(found["seeds"], f"{name}: seeds"),
+        noise=_axis(found["noise"], take_number, f"{name}: noise") or (),
+        seed=seed,
+        **{key: value for key, value in given.items() if value is not None},
+    )
+    check_study(study, name)
+    return study
+
+
+def _candidates(entry: Any, where: str, folder: str) -> list[Candidate]:
+    """The robots of one entry, one for each point of its grid."""
+    found = take_keys(entry, where, ("model",), ("name", "scale", "spread"))
+    model, title = _model(found["model"], f"{where}: model", folder)
+    title = _if_given(found["name"], take_text, f"{where}: name") or title
+    scale = take_keys(found["scale"] or {}, f"{where}: scale", (), PARTS)
+    spread = take_keys(found["spread"] or {}, f"{where}: spread", (), PARTS)
+    widths = tuple(0.0 if v is None else take_number(v, f"{where}: spread.{key}") for key, v in spread.items())
+    grid = {
+        key: _axis(value if isinstance(value, list) else [value], take_number, f"{where}: scale.{key}") or ()
+        for key, value in scale.items()
+        if value is not None
+    }
+    empty = next((key for key, factors in grid.items() if not factors), None)
+    if empty is not None:
+        raise InputError(f"{where}: scale.{empty}: is empty; it needs at least one entry")
+    points = [dict(zip(grid, point, strict=True)) for point in itertools.product(*grid.values())]
+    return [Candidate(_label(title, point), _scaled(model, point), widths) for point in points]
+
+
+def _model(value: Any, where: str, folder: str) -> tuple[Model, str]:
+    """A model, or one by its name or file, and how it is called."""
+    if isinstance(value, Model):
+        return value, "robot"
+    name = take_text(value, where)
+    beside = os.path.join(folder, name)
+    try:
+        return load_model(beside if os.path.exists(beside) else name), name
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def _label(title: str, point: dict[str, float]) -> str:
+    return " ".join([title, *(f"{key}x{factor:g}" for key, factor in point.items())])
+
+
+def _scaled(model: Model, point: dict[str, float]) -> Model:
+    if not point:
+        return model
+    drive = require_physical(model)
+    parts = drive._asdict() | {"dead_zone": model.dead_zone}
+    moved = {key: None if v is None else point.get(key, 1.0) * np.asarray(v, float) for key, v in parts.items()}
+    width = moved.pop("dead_zone")
+    return Model(model.sample_period, Physical(**moved), width, model.noise, model.effects)
+
+
+def _choice(entry: Any, where: str) -> Choice:
+    found = take_keys({"method": entry} if isinstance(entry, str) else entry, where, ("method",), ("name", "settings"))
+    method = take_text(found["method"], f"{where}: method")
+    settings = take_object(found["settings"] or {}, f"{where}: settings")
+    return Choice(_if_given(found["name"], take_text, f"{where}: name") or method, method, tuple(settings.items()))
+
+
+def _axis(value: Any, take: Callable[[Any, str], Any], where: str) -> tuple[Any, ...] | None:
+    """The entries of an axis, or None where it is left out."""
+    if value is None:
+        return None
+    entries = value if isinstance(value, tuple) else take_list(value, where)
+    return tuple(take(entry, f"{where}[{k}]") for k, entry in enumerate(entries))
+
+
+def _whole(value: Any, where: str) -> int:
+    number = take_number(value, where)
+    if not number.is_integer():
+        raise InputError(f"{where}: is {number:g}; it should be a whole number")
+    return int(number)
+
+
+def _if_given(value: Any, take: Callable[[Any, str], Any], where: str) -> Any:
+    return None if value is None else take(value, where)

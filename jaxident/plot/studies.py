@@ -1,0 +1,114 @@
+"""What a Monte-Carlo study found: error against noise, maps over two axes, distributions of errors."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+
+from jaxident.plot import style
+from jaxident.plot.estimates import BAND, HOLLOW, scale_for_levels
+from jaxident.plot.names import LENGTH, written
+
+BINS = 40
+SHOWN_SHARE = 0.99
+"""Share of the errors that a histogram's width takes in; the few beyond count in its outer bins."""
+
+MAP = "cividis"
+"""Colours of a map: even in brightness, and alike for colour-blind readers."""
+
+
+class Curve(NamedTuple):
+    """Statistics of one estimator at each noise level (levels,), in SI units."""
+
+    rmse: Any
+    rmse_se: Any
+    bias: Any
+    bias_se: Any
+
+
+def error_curves(
+    noise: Any, curves: Mapping[str, Curve], *, label: str, ax: Axes | None = None, bound: Any = None
+) -> Axes:
+    """Root-mean-square error of one parameter against the camera's position noise [m] (levels,), each estimator with
+    the 95 % band of its Monte-Carlo error, both axes logarithmic; hollow marks are the size of the bias.
+
+    bound: smallest standard deviation possible (levels,). label: the parameter's name.
+    """
+    ax = style.axes_or_new(ax, (style.WIDTH, 3.6))
+    unit, scale = LENGTH
+    level, how = scale * np.asarray(noise, float), written(label)
+    scale_for_levels(ax, level)
+    for number, (name, curve) in enumerate(curves.items()):
+        colour, marker = style.SERIES[number % len(style.SERIES)]
+        shift = level * (1.0 + 0.04 * (number - 0.5 * (len(curves) - 1)))
+        rmse, rmse_se, bias, bias_se = (how.scale * np.asarray(part, float) for part in curve)
+        low = np.maximum(rmse - BAND * rmse_se, 1e-3 * rmse)
+        ax.fill_between(shift, low, rmse + BAND * rmse_se, color=colour, alpha=0.25, linewidth=0)
+        ax.plot(shift, rmse, color=colour, linewidth=style.LINE, marker=marker, markersize=3.5, zorder=3, label=name)
+        hollow: dict[str, Any] = HOLLOW | {"marker": marker, "zorder": 2.5}
+        ax.errorbar(shift, np.abs(bias), bias_se, color=colour, elinewidth=style.THIN, capsize=2, **hollow)
+    ax.plot([], [], color=style.GREY, linewidth=style.LINE, marker="o", markersize=3.5, label="root mean square")
+    ax.plot([], [], color=style.GREY, marker="o", **HOLLOW, label="bias with standard error")
+    if bound is not None:
+        lowest = how.scale * np.asarray(bound, float)
+        ax.plot(level, lowest, color=style.TRUE, linestyle="--", linewidth=style.LINE, label="Cramér-Rao bound")
+    ax.set(xlabel=f"camera noise in position [{unit}]", ylabel=f"error of {how.label}")
+    style.legend_above(ax)
+    return ax
+
+
+def heat_map(values: Any, *, rows: Sequence[str], columns: Sequence[str], label: str, ax: Axes | None = None) -> Axes:
+    """Positive values (rows, columns) as colours on a logarithmic scale, each written into its field; NaN is empty.
+
+    label: what the values are, with their unit, above the map.
+    """
+    ax = style.axes_or_new(ax)
+    values = np.asarray(values, float)
+    known = values[np.isfinite(values) & (values > 0.0)]
+    low, high = (np.min(known), np.max(known)) if known.size else (1.0, 10.0)
+    norm = LogNorm(low, max(high, 1.01 * low))
+    ax.imshow(np.where(values > 0.0, values, np.nan), cmap=MAP, norm=norm, aspect="auto")
+    for (row, column), value in np.ndenumerate(values):
+        if np.isfinite(value):
+            bright = value > 0.0 and norm(value) > 0.6
+            colour = style.BLACK if bright else "white"
+            ax.text(column, row, f"{value:.3g}", ha="center", va="center", color=colour, fontsize=style.TEXT - 1)
+    ax.set_xticks(range(len(columns)), columns)
+    ax.set_yticks(range(len(rows)), rows)
+    ax.set_title(label, loc="left")
+    ax.grid(visible=False)
+    ax.tick_params(length=0)
+    for side in ax.spines.values():
+        side.set_visible(False)
+    return ax
+
+
+def error_histogram(
+    errors: Mapping[str, Any], *, label: str, ax: Axes | None = None, bound: float | None = None
+) -> Axes:
+    """Distribution of the error of one parameter, {estimator: (trials,)} in SI units with NaN for failures.
+
+    bound: smallest standard deviation possible, drawn as the normal density of that width around zero.
+    """
+    ax = style.axes_or_new(ax, (style.WIDTH, 2.8))
+    how = written(label)
+    kept = {name: how.scale * np.asarray(v, float)[np.isfinite(v)] for name, v in errors.items()}
+    width = max((np.quantile(np.abs(v), SHOWN_SHARE) for v in kept.values() if v.size), default=1.0) or 1.0
+    edges = np.linspace(-width, width, BINS + 1)
+    for number, (name, values) in enumerate(kept.items()):
+        if values.size:
+            heights = np.histogram(np.clip(values, -width, width), edges)[0] / (values.size * (edges[1] - edges[0]))
+            colour = style.SERIES[number % len(style.SERIES)][0]
+            ax.stairs(heights, edges, color=colour, fill=True, alpha=0.25)
+            ax.stairs(heights, edges, color=colour, linewidth=style.LINE, label=name)
+    ax.axvline(0.0, color=style.TRUE, linewidth=style.THIN, linestyle="--")
+    if bound is not None:
+        spread = how.scale * bound
+        x = np.linspace(-width, width, 400)
+        density = np.exp(-0.5 * (x / spread) ** 2) / (spread * np.sqrt(2.0 * np.pi))
+        ax.plot(x, density, color=style.TRUE, linewidth=style.LINE, label="Cramér-Rao bound")
+    ax.set(xlabel=f"error of {how.label}", yticks=[], xlim=(-width, width))
+    style.legend_above(ax)
+    return ax

@@ -1,0 +1,220 @@
+"""The page of `jaxident sweep`, and the picture of one of its trials."""
+
+import math
+import os
+from typing import Any
+
+import numpy as np
+import xarray
+
+from jaxident import plot
+from jaxident.array_types import Increment
+from jaxident.files.atomic import Target
+from jaxident.log import make_log
+from jaxident.plot.names import written
+from jaxident.plot.studies import Curve
+from jaxident.report.page import Figure, Page, Section, Table, write_page
+from jaxident.robot.model import DIFFERENCE_ORDER
+from jaxident.robot.path_length import path_length
+from jaxident.study.design import AXES, Study
+from jaxident.study.estimators import REASONS
+from jaxident.study.statistics import BROKEN_ERROR, BROKEN_SHARE, CELLS
+from jaxident.study.trial import Outcome, Recording
+
+SHOWN = ("alpha_1", "alpha_2", "delta_21", "dead_zone_r")
+HISTOGRAM_TRIALS = 10_000
+SHOWN_ROWS = 300
+LISTED = 60
+"""Rows that a table of the page shows; the rest stands in summary.csv."""
+
+
+def write_study(study: Study, trials: xarray.Dataset, summary: xarray.Dataset, path: Target) -> list[str]:
+    """Write the page of a study; returns its path. Of the trials it reads one cell."""
+    write_page(_page(study, trials, summary), path)
+    return [os.fspath(path)]
+
+
+def _page(study: Study, trials: xarray.Dataset, summary: xarray.Dataset) -> Page:
+    base = {axis: 0 for axis in CELLS if axis != "noise"}
+    sections = [
+        Section("Failures and break-down", [_breakdown_text(), _breakdown_table(summary)]),
+        Section("Error against noise", [_where(summary, base), *(_curves(summary, base, name) for name in SHOWN)]),
+        Section("Maps", [_map_text(), *_maps(summary, base)]),
+        Section("Distributions", [_histogram(study, trials, summary, name) for name in SHOWN]),
+        Section("All numbers", [_numbers(summary.isel(base))]),
+    ]
+    versions = trials.attrs["versions"]
+    return Page(study.name, _lead(study, summary), sections, f"seed {study.seed}; {versions}")
+
+
+def _lead(study: Study, summary: xarray.Dataset) -> str:
+    failed = int(summary["failures"].sum())
+    every = study.trials * len(study.estimators)
+    axes = ", ".join(f"{n} {_plural(axis, n)}" for axis, n in zip(AXES, study.shape, strict=True) if n > 1)
+    return f"{study.trials} trials ({axes or 'one each'}), {every} estimates, {failed} of them failed."
+
+
+def _plural(axis: str, count: int) -> str:
+    words = {"samples": "run lengths", "noise": "noise levels"}
+    return words.get(axis, f"{axis}s") if count > 1 else axis
+
+
+def _breakdown_text() -> str:
+    return (
+        f"An estimator is called broken where the root-mean-square error of its median parameter exceeds "
+        f"{100 * BROKEN_ERROR:g} % of the parameter, or where more than {100 * BROKEN_SHARE:g} % of its trials fail. "
+        "A failed trial is counted here and is in no other number."
+    )
+
+
+def _breakdown_table(summary: xarray.Dataset) -> Table:
+    """A row for each estimator and cell but for the noise: break-down level and failures by reason."""
+    failures = summary["failures"].sum("noise")
+    axes = [axis for axis in (*CELLS, "estimator") if axis != "noise"]
+    told = [axis for axis in axes if axis == "estimator" or summary.sizes[axis] > 1]
+    level = summary["breakdown"].transpose(*axes)
+    reasons = [str(name) for name in summary["reason"].values if int(failures.sel(reason=name).sum())]
+    rows = []
+    for index in list(np.ndindex(level.shape))[:LISTED]:
+        at = dict(zip(axes, index, strict=True))
+        value = float(level[at])
+        told_level = "none of these" if math.isnan(value) else f"{1e3 * value:.4g} mm"
+        counts = [int(failures.isel(at).sel(reason=name)) for name in reasons]
+        rows.append((*(_entry(summary, axis, at[axis]) for axis in told), told_level, *counts))
+    more = f" The first {LISTED} of {level.size}." if level.size > LISTED else ""
+    return Table((*told, "broken from", *reasons), rows, f"Lowest camera noise that breaks the estimator.{more}")
+
+
+def _entry(summary: xarray.Dataset, axis: str, index: int) -> str:
+    value = summary[axis].values[index]
+    return value if isinstance(value, str) else f"{value:.4g}"
+
+
+def _where(summary: xarray.Dataset, at: dict[str, int]) -> str:
+    """Which cell is shown, of the axes that have several."""
+    told = [f"{axis} {_entry(summary, axis, k)}" for axis, k in at.items() if summary.sizes[axis] > 1]
+    return f"Shown for {', '.join(told)}; summary.csv has all." if told else "Over all seeds."
+
+
+def _curves(summary: xarray.Dataset, at: dict[str, int], name: str) -> Figure:
+    cell = summary.isel(at).sel(parameter=name)
+    curves = {
+        str(one): Curve(*(cell[part].sel(estimator=one).values for part in Curve._fields))
+        for one in summary["estimator"].values
+    }
+    bound = None
+    if "rmse_over_bound" in cell:
+        bound = (cell["rmse"] / cell["rmse_over_bound"]).isel(estimator=0).values
+    figure, ax = plot.figure(size=(6.3, 3.8))
+    plot.error_curves(summary["noise"].values, curves, label=name, ax=ax, bound=bound)
+    return Figure(plot.image(figure), f"Error of {name} against camera noise")
+
+
+def _map_text() -> str:
+    return "Root-mean-square error in per cent of the parameter's true value; camera noise in position [mm] below."
+
+
+def _maps(summary: xarray.Dataset, base: dict[str, int]) -> list[Figure]:
+    """For each estimator parameters over noise, and each further axis over noise for the median parameter."""
+    share = 100.0 * summary["rmse"] / np.abs(summary["truth"])
+    noise = [f"{1e3 * level:.3g}" for level in summary["noise"].values]
+    made = []
+    for one in map(str, summary["estimator"].values):
+        cell = share.sel(estimator=one)
+        names = [written(name).symbol for name in DIFFERENCE_ORDER]
+        made.append(_map(cell.isel(base).transpose("parameter", "noise").values, names, noise, f"{one}: error [%]"))
+        for axis in (axis for axis in base if summary.sizes[axis] > 1):
+            rest = {key: k for key, k in base.items() if key != axis}
+            middle = cell.isel(rest).median("parameter", skipna=False).transpose(axis, "noise").values
+            labels = [_entry(summary, axis, k) for k in range(summary.sizes[axis])]
+            made.append(_map(middle, labels, noise, f"{one}: error of the median parameter [%], by {axis}"))
+    return made
+
+
+def _map(values: Any, rows: list[str], columns: list[str], label: str) -> Figure:
+    figure, ax = plot.figure(size=(6.3, 0.6 + 0.27 * max(len(rows), 2)))
+    plot.heat_map(values, rows=rows, columns=columns, label=label, ax=ax)
+    return Figure(plot.image(figure), label)
+
+
+def _histogram(study: Study, trials: xarray.Dataset, summary: xarray.Dataset, name: str) -> Figure:
+    """The errors of a parameter in the first cell, at the middle noise level."""
+    middle = len(study.noise) // 2
+    cut = (*(middle if axis == "noise" else 0 for axis in CELLS), slice(0, HISTOGRAM_TRIALS))
+    column = DIFFERENCE_ORDER.index(name)
+    truth = np.asarray(trials["truth"].variable[(*cut, column)])
+    estimates = np.asarray(trials["estimate"].variable[(*cut, slice(None), column)])
+    errors = {choice.name: estimates[:, k] - truth for k, choice in enumerate(study.estimators)}
+    bound = None
+    if "rmse_over_bound" in summary:
+        cell = summary.isel({axis: middle if axis == "noise" else 0 for axis in CELLS}).sel(parameter=name)
+        bound = float((cell["rmse"] / cell["rmse_over_bound"]).isel(estimator=0))
+    figure, ax = plot.figure(size=(6.3, 2.8))
+    plot.error_histogram(errors, label=name, ax=ax, bound=bound)
+    level = f"{1e3 * study.noise[middle]:.4g} mm"
+    return Figure(plot.image(figure), f"Errors of {name}", f"Errors of {name} at {level} of camera noise.")
+
+
+def _numbers(cell: xarray.Dataset) -> Table:
+    """Bias, deviation, error and coverage of the shown cell."""
+    rows = []
+    for one, level in ((o, n) for o in cell["estimator"].values for n in range(cell.sizes["noise"])):
+        at = cell.sel(estimator=one).isel(noise=level)
+        for k, name in enumerate(DIFFERENCE_ORDER):
+            values = [float(at[part][k]) for part in ("bias", "bias_se", "sd", "rmse", "rmse_se", "coverage")]
+            rows.append((str(one), f"{1e3 * float(at['noise']):.3g}", name, *values))
+    titles = ("estimator", "noise [mm]", "parameter", "bias", "± bias", "sd", "rmse", "± rmse", "coverage")
+    more = f" The first {LISTED} of {len(rows)}; all stand in summary.csv." if len(rows) > LISTED else ""
+    return Table(titles, rows[:LISTED], f"± is the Monte-Carlo standard error; SI units.{more}")
+
+
+def trial_rows(study: Study, number: int, outcome: Outcome) -> list[tuple[str, ...]]:
+    """A trial as rows of text: the truth and every estimate with its standard deviation, then how each one ended."""
+    head = ("parameter", "true", *(word for one in study.estimators for word in (one.name, "sd")))
+    rows = [head]
+    for k, name in enumerate(DIFFERENCE_ORDER):
+        pairs = [(outcome.estimate[e, k], outcome.deviation[e, k]) for e in range(len(study.estimators))]
+        rows.append((name, *(f"{value:.5g}" for value in (outcome.truth[k], *(v for pair in pairs for v in pair)))))
+    endings = [word for code in outcome.reason for word in (REASONS[int(code)], "")]
+    return [*rows, ("ended", "", *endings)]
+
+
+def draw_trial(study: Study, number: int, recording: Recording, outcome: Outcome) -> Any:
+    """A figure of one trial: path, commands and increments of its first rows, errors of its estimates."""
+    period = float(recording.robot.sample_period)
+    exact, measured = (
+        make_log(period * np.arange(len(pose.x)), *recording.command, *pose)
+        for pose in (recording.exact, recording.measured)
+    )
+    figure, axes = plot.figure(4, 1, size=(6.9, 10.5), heights=(2.2, 1.0, 1.0, 1.4))
+    plot.path(measured, ax=axes[0])
+    axes[0].plot(exact.x, exact.y, color="black", linewidth=0.6, linestyle="--")
+    plot.commands(measured.rows(0, SHOWN_ROWS), ax=axes[1], dead_zone=np.asarray(recording.robot.dead_zone))
+    seen, true = (Increment(*(np.asarray(c)[:SHOWN_ROWS] for c in path_length(log.pose))) for log in (measured, exact))
+    plot.increments(exact.t[1 : len(seen.turn) + 1], seen, true, ax=axes[2], channel="turn")
+    for k, choice in enumerate(study.estimators):
+        error = 100.0 * (outcome.estimate[k] / outcome.truth - 1.0)
+        place = np.arange(len(DIFFERENCE_ORDER)) + 0.15 * k
+        bar = np.abs(100.0 * 1.96 * outcome.deviation[k] / outcome.truth)
+        axes[3].errorbar(place, error, bar, linestyle="none", marker="os^Dv"[k % 5], markersize=4, label=choice.name)
+    axes[3].set_xticks(range(len(DIFFERENCE_ORDER)), [written(name).symbol for name in DIFFERENCE_ORDER])
+    axes[3].set(ylabel="error [%] with 95 % interval", yscale="symlog")
+    axes[3].legend(frameon=False, ncols=2)
+    axes[0].set_title(_title(study, number), loc="left")
+    return figure
+
+
+def _title(study: Study, number: int) -> str:
+    index = np.unravel_index(number, study.shape)
+    entries: tuple[Any, ...] = (
+        study.excitations,
+        study.samples,
+        [one.name for one in study.robots],
+        study.period,
+        study.amplitude,
+    )
+    values = [axis[int(k)] for axis, k in zip(entries, index, strict=False)]
+    return (
+        f"trial {number}: {values[0]}, {values[1]} rows, {values[2]}, {values[3]:.4g} s, amplitude {values[4]:g},\n"
+        f"camera noise {1e3 * study.noise[index[5]]:.4g} mm, seed {index[6]}"
+    )

@@ -1,0 +1,88 @@
+"""A study's chunks as tasks of Dask distributed, on this machine or many; extra `cluster`.
+
+Only this process writes: workers return arrays, and need neither the study's folder nor a shared disk.
+"""
+
+import contextlib
+import re
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from jaxident.errors import InputError, WorkError
+from jaxident.start import start_jax
+from jaxident.study.dataset import versions
+from jaxident.study.design import Study
+from jaxident.study.engine import chunks, run_chunk
+from jaxident.study.trial import Outcome
+
+AHEAD = 2
+"""Chunks that each worker has in hand: the next one waits there while one is computed."""
+
+RETRIES = 3
+PATIENCE = "20s"
+WITHOUT_THREADS = "--xla_cpu_multi_thread_eigen=false"
+
+
+@contextlib.contextmanager
+def connected(scheduler: str) -> Iterator[Any]:
+    """A Dask client: of a scheduler's address, or of `local:N`, N processes of one thread each on this machine, bound
+    to its loopback. InputError where Dask is missing, the text is neither, or nobody answers."""
+    try:
+        import distributed
+    except ImportError:
+        raise InputError("--scheduler needs Dask: install jaxident with the extra `cluster`") from None
+    local = re.fullmatch(r"local:([1-9]\d*)", scheduler)
+    if scheduler.startswith("local") and not local:
+        raise InputError(f"--scheduler {scheduler}: local:N with N processes from 1 on, as local:2")
+    with contextlib.ExitStack() as stack:
+        if local:
+            settings = distributed.LocalCluster(
+                n_workers=int(local[1]),
+                threads_per_worker=1,
+                host="127.0.0.1",
+                dashboard_address=None,
+                silence_logs="critical",
+                env={"XLA_FLAGS": WITHOUT_THREADS},
+            )
+            scheduler = stack.enter_context(settings).scheduler_address
+        try:
+            client = stack.enter_context(distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False))
+        except (OSError, ValueError) as error:
+            raise InputError(f"--scheduler {scheduler}: nobody answers there: {error}") from None
+        yield client
+
+
+def run_on(client: Any, study: Study, numbers: Sequence[int]) -> Iterator[tuple[int, Outcome]]:
+    """The chunks of these numbers, in the order in which they are done; a worker that dies is replaced by others.
+
+    WorkError where a chunk takes down every worker that tries it, or where workers have other versions.
+    """
+    from distributed import KilledWorker, as_completed
+
+    waiting = iter(numbers)
+    whole = client.scatter(study, broadcast=True) if numbers else None
+    ours = versions()
+    workers = max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
+
+    def submit(count: int) -> list[Any]:
+        batch = [number for number, _ in zip(waiting, range(count), strict=False)]
+        return [client.submit(_task, whole, number, ours, pure=False, retries=RETRIES) for number in batch]
+
+    running = as_completed(submit(AHEAD * workers))
+    try:
+        for future in running:
+            number, outcome = future.result()
+            running.update(submit(1))
+            future.release()
+            yield number, outcome
+    except KilledWorker as error:
+        raise WorkError(f"a chunk ended {RETRIES} workers or more: {error}") from None
+
+
+def _task(study: Study, number: int, expected: dict[str, str]) -> tuple[int, Outcome]:
+    """One chunk, on a worker's own single thread."""
+    start_jax()
+    if versions() != expected:
+        found = ", ".join(f"{k} {v}" for k, v in versions().items() if expected.get(k) != v)
+        raise WorkError(f"a worker has {found} where this process has another version; install the same everywhere")
+    return number, run_chunk(study, chunks(study)[number], cores=1)

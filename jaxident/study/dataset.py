@@ -1,0 +1,131 @@
+"""A study's arrays with names: axes, units, and where the numbers come from."""
+
+import json
+import platform
+from collections.abc import Mapping
+from importlib.metadata import version
+from typing import Any
+
+import jax
+import numpy as np
+import xarray
+
+from jaxident.robot.model import DIFFERENCE_ORDER
+from jaxident.study.design import AXES, PARTS, Study, check_study
+from jaxident.study.engine import chunks, run_locally
+from jaxident.study.estimators import REASONS, settings_of
+from jaxident.study.trial import Outcome
+
+FURTHER_AXES = {
+    "estimate": ("estimator", "parameter"),
+    "deviation": ("estimator", "parameter"),
+    "truth": ("parameter",),
+    "reason": ("estimator",),
+}
+"""The variables of a study, fields of `Outcome`, and their axes after AXES."""
+
+_MEANING: dict[str, dict[str, Any]] = {
+    "estimate": {"long_name": "estimated parameter, NaN where the estimator failed"},
+    "deviation": {"long_name": "standard deviation that the estimator claims, NaN where it claims none"},
+    "truth": {"long_name": "parameter of the robot that made the log"},
+    "reason": {
+        "long_name": "how the estimate ended",
+        "flag_values": list(range(len(REASONS))),
+        "flag_meanings": "; ".join(REASONS),
+    },
+}
+_UNITS = {"alpha": "1", "dead_zone": "unit", "1": "m/unit", "2": "rad/unit"}
+
+
+def study_arrays(study: Study) -> xarray.Dataset:
+    """Run a study in memory: all trials with named axes. InputError for a study that makes no sense; needs double
+    precision."""
+    check_study(study)
+    arrays = {name: np.empty(shape, kind) for name, (shape, kind) in layout(study).items()}
+    cut = chunks(study)
+    for number, outcome in run_locally(study, range(len(cut))):
+        for name, part in outcome._asdict().items():
+            arrays[name][cut[number].cut] = part
+    made = xarray.Dataset({name: (AXES + FURTHER_AXES[name], array, _MEANING[name]) for name, array in arrays.items()})
+    return made.assign_coords(coordinates(study).coords).assign_attrs(coordinates(study).attrs)
+
+
+def layout(study: Study) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
+    """Shape and type of each variable."""
+    further = {"estimator": len(study.estimators), "parameter": len(DIFFERENCE_ORDER)}
+    return {
+        name: (study.shape + tuple(further[axis] for axis in axes), np.dtype("i1" if name == "reason" else "f8"))
+        for name, axes in FURTHER_AXES.items()
+    }
+
+
+def attributes(name: str) -> dict[str, Any]:
+    """What a variable means."""
+    return _MEANING[name]
+
+
+def coordinates(study: Study) -> xarray.Dataset:
+    """The axes of a study with their units, and its provenance: a dataset without variables."""
+    noise = np.asarray(study.noise, float)
+    entries: dict[str, tuple[str, Any, dict[str, Any]]] = {
+        "excitation": ("excitation", list(study.excitations), {}),
+        "samples": ("samples", list(study.samples), {"long_name": "rows of a run"}),
+        "robot": ("robot", [candidate.name for candidate in study.robots], {}),
+        "period": ("period", list(study.period), {"units": "s", "long_name": "sample period"}),
+        "amplitude": ("amplitude", list(study.amplitude), {"units": "unit", "long_name": "largest command"}),
+        "noise": ("noise", noise, {"units": "m", "long_name": "standard deviation of the camera's position"}),
+        "heading_noise": (
+            "noise",
+            study.heading_per_position * noise,
+            {"units": "rad", "long_name": "standard deviation of the camera's heading"},
+        ),
+        "seed": ("seed", np.arange(study.seeds), {}),
+        "estimator": ("estimator", [choice.name for choice in study.estimators], {}),
+        "parameter": ("parameter", list(DIFFERENCE_ORDER), {"long_name": "as in a model file"}),
+        "unit": ("parameter", [_unit(name) for name in DIFFERENCE_ORDER], {}),
+    }
+    return xarray.Dataset(coords=entries, attrs=provenance(study))
+
+
+def provenance(study: Study) -> dict[str, str]:
+    """Name, seed, versions and the whole study as JSON text."""
+    return {
+        "title": study.name,
+        "seed": str(study.seed),
+        "versions": json.dumps(versions()),
+        "study": json.dumps(describe(study)),
+    }
+
+
+def versions() -> dict[str, str]:
+    """What a study's last bits depend on besides itself."""
+    packages = {name: version(name) for name in ("jaxident", "jax", "jaxlib", "optimistix", "numpy")}
+    return packages | {"device": jax.default_backend(), "machine": platform.machine()}
+
+
+def describe(study: Study) -> dict[str, Any]:
+    """Everything that a study's numbers depend on, as lists, numbers and text."""
+    plain = {key: list(v) if isinstance(v, tuple) else v for key, v in study._asdict().items()}
+    robots = [
+        {"name": one.name, **_parts(one.model), "spread": dict(zip(PARTS, one.spread, strict=True))}
+        for one in study.robots
+    ]
+    estimators = [{"name": one.name, "method": one.method, **settings_of(one)} for one in study.estimators]
+    return plain | {"robots": robots, "estimators": estimators}
+
+
+def _parts(model: Any) -> dict[str, Any]:
+    drive, noise = model.dynamics, model.noise
+    lists = {key: None if part is None else np.asarray(part, float).tolist() for key, part in drive._asdict().items()}
+    slip = None if noise is None else [float(noise.slip_along), float(noise.slip_heading)]
+    return lists | {"dead_zone": np.asarray(model.dead_zone, float).tolist(), "slip": slip}
+
+
+def _unit(parameter: str) -> str:
+    kind, _, index = parameter.rpartition("_")
+    return _UNITS[kind] if kind in _UNITS else _UNITS[index[0]]
+
+
+def outcome_of(trials: Mapping[str, Any], cut: tuple[Any, ...]) -> Outcome:
+    """A part of a study's arrays, read now."""
+    return Outcome(*(np.asarray(trials[name].variable[cut]) for name in Outcome._fields))

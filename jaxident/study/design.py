@@ -1,0 +1,121 @@
+"""What a Monte-Carlo study runs over: its axes, its robots, its estimators, and whether they make sense."""
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from jaxident.errors import InputError
+from jaxident.robot.excitation import EXCITATIONS
+from jaxident.robot.model import Model, require_physical
+from jaxident.study.estimators import Choice, check_choice
+
+AXES = ("excitation", "samples", "robot", "period", "amplitude", "noise", "seed")
+"""The axes of a study's trials in their order, the last one fastest."""
+
+PARTS = ("rate", "gain", "coupling", "dead_zone")
+"""The parts of a robot that a study may scale or spread."""
+
+SMALLEST_RUN = 20
+CHUNK = 2000
+HEADING_PER_POSITION = 10.0
+"""Heading noise for each metre of position noise [rad/m]: 10 mrad at 1 mm, an overhead camera's usual ratio."""
+
+
+class Candidate(NamedTuple):
+    """A robot of the study: a name, a model in physical parameters, and by what part of itself, at most, each of PARTS
+    departs from it, drawn anew for every seed (uniform, the same for all other axes)."""
+
+    name: str
+    model: Model
+    spread: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
+
+
+class Study(NamedTuple):
+    """A Monte-Carlo study: every combination of its axes, each with `seeds` seeds, each seen by every estimator.
+
+    excitations: names of `EXCITATIONS`; samples: rows of a run; period [s]; amplitude [unit of the command]; noise:
+    standard deviations of the camera's position [m], its heading has heading_per_position [rad/m] times as much;
+    correlation_time [s] of both, None for white noise. hold: samples that a level of the excitation lasts. seed: the
+    number that all random draws follow from. chunk: trials computed and stored together, which bounds the memory.
+    """
+
+    robots: tuple[Candidate, ...]
+    estimators: tuple[Choice, ...]
+    seeds: int
+    noise: tuple[float, ...]
+    excitations: tuple[str, ...] = ("multilevel",)
+    amplitude: tuple[float, ...] = (1.0,)
+    samples: tuple[int, ...] = (1000,)
+    period: tuple[float, ...] = (1.0 / 30.0,)
+    hold: int = 20
+    heading_per_position: float = HEADING_PER_POSITION
+    correlation_time: float | None = None
+    seed: int = 0
+    name: str = "study"
+    chunk: int = CHUNK
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Length of each of AXES."""
+        axes = (self.excitations, self.samples, self.robots, self.period, self.amplitude, self.noise)
+        return (*map(len, axes), self.seeds)
+
+    @property
+    def trials(self) -> int:
+        """How many logs are simulated; each is seen by every estimator."""
+        return math.prod(self.shape)
+
+
+def check_study(study: Study, where: str = "study") -> None:
+    """InputError naming the key, what is wrong and what would be right; `where` is what the line calls the study."""
+    _check_axes(study, where)
+    for key in ("seeds", "hold", "chunk"):
+        if getattr(study, key) < 1:
+            raise InputError(f"{where}: {key}: is {getattr(study, key)}; it should be at least 1")
+    if study.heading_per_position < 0.0:
+        raise InputError(f"{where}: heading_per_position: is {study.heading_per_position:g}; it should not be negative")
+    if study.correlation_time is not None and not study.correlation_time > 0.0:
+        raise InputError(f"{where}: correlation_time: is {study.correlation_time:g}; it should be above 0, or left out")
+    for candidate in study.robots:
+        _check_candidate(candidate, f"{where}: robot {candidate.name!r}")
+    for choice in study.estimators:
+        check_choice(choice, f"{where}: estimator {choice.name!r}")
+
+
+def _check_axes(study: Study, where: str) -> None:
+    unknown = next((kind for kind in study.excitations if kind not in EXCITATIONS), None)
+    if unknown is not None:
+        raise InputError(f"{where}: excitations: {unknown!r} is not one of {', '.join(EXCITATIONS)}")
+    names = [candidate.name for candidate in study.robots], [choice.name for choice in study.estimators]
+    entries = {key: getattr(study, key) for key in ("excitations", "amplitude", "samples", "period", "noise")}
+    for key, values in (entries | {"robots": names[0], "estimators": names[1]}).items():
+        _check_axis(values, f"{where}: {key}")
+    for key, values in (("amplitude", study.amplitude), ("period", study.period)):
+        if min(values) <= 0.0:
+            raise InputError(f"{where}: {key}: {min(values):g} is not above 0")
+    if min(study.noise) < 0.0:
+        raise InputError(f"{where}: noise: {min(study.noise):g} is negative; it is a standard deviation in metres")
+    if min(study.samples) < SMALLEST_RUN:
+        raise InputError(f"{where}: samples: {min(study.samples)} is too short; a run has at least {SMALLEST_RUN} rows")
+
+
+def _check_axis(values: Sequence[Any], where: str) -> None:
+    if not values:
+        raise InputError(f"{where}: is empty; it needs at least one entry")
+    if any(isinstance(value, float) and not math.isfinite(value) for value in values):
+        raise InputError(f"{where}: every entry should be a finite number")
+    twice = next((value for value in values if list(values).count(value) > 1), None)
+    if twice is not None:
+        raise InputError(f"{where}: {twice!r} stands there twice; keep one")
+
+
+def _check_candidate(candidate: Candidate, where: str) -> None:
+    try:
+        require_physical(candidate.model)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    if candidate.model.effects:
+        raise InputError(f"{where}: effects: studies run nominal models only")
+    bad = next((width for width in candidate.spread if not 0.0 <= width < 1.0), None)
+    if bad is not None:
+        raise InputError(f"{where}: spread: {bad:g} should be at least 0 and below 1")

@@ -1,0 +1,193 @@
+"""The estimators that a study can run, by name: pure functions of one noisy log.
+
+To add one: a function (Sight, settings) -> Finding and an entry in METHODS. Settings are Python values that fix the
+compiled program.
+"""
+
+import functools
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxident.array_types import Array, Increment, Pose, Wheels
+from jaxident.errors import InputError
+from jaxident.estimation import recursive
+from jaxident.estimation.identify import D_MAX_SHARE, SETUP_SAMPLES, SETUP_SHARE, SMALLEST_LOG, parameter_covariance
+from jaxident.estimation.initialise import Setup, initialise
+from jaxident.estimation.observations import Observations, complete_observations, observe_log
+from jaxident.estimation.projection import project
+from jaxident.estimation.readings import NAMES, reading_of, usable
+from jaxident.log import Log
+from jaxident.robot.model import difference_vector
+from jaxident.robot.path_length import path_length
+
+REASONS = (
+    "found",
+    "the robot does not move",
+    "no start values",
+    "the estimate is not finite",
+)
+"""How an estimate ended; its index is stored with every trial, 0 is success."""
+
+FOUND, AT_REST, NO_START, NOT_FINITE = range(4)
+
+UNKNOWNS_OF_ONE_CHANNEL = 6
+"""Numbers that one channel's residuals determine: its pole, four numerator coefficients, its share of two widths."""
+
+
+class Sight(NamedTuple):
+    """What an estimator sees of a trial: one even run without gaps, arrays (samples,), and what can be had from it.
+
+    observations leave out the first sample, whose command before is unknown. setup(rows, reading, d_max) gives the
+    start values from the first rows; estimators that ask for the same share the work.
+    """
+
+    log: Log
+    observations: Observations
+    setup: Callable[[int, str, Array], Setup]
+    largest: Array
+
+
+class Finding(NamedTuple):
+    """Estimate and standard deviations (12,) in DIFFERENCE_ORDER (NaN: none is known), and an index of REASONS."""
+
+    estimate: Any
+    deviation: Any
+    reason: Any
+
+
+class Setting(NamedTuple):
+    """A setting of a method: its value where none is given, which values are right, and how to say so."""
+
+    default: Any
+    valid: Callable[[Any], bool]
+    right: str
+
+
+class Method(NamedTuple):
+    """run(sight, settings) -> Finding, and the settings it takes."""
+
+    run: Callable[[Sight, dict[str, Any]], Finding]
+    settings: dict[str, Setting]
+
+
+class Choice(NamedTuple):
+    """An estimator of a study: its name there, its method, and (key, value) pairs of settings that are not default."""
+
+    name: str
+    method: str
+    settings: tuple[tuple[str, Any], ...] = ()
+
+
+def settings_of(choice: Choice) -> dict[str, Any]:
+    """All settings of a choice, defaults included."""
+    known = METHODS[choice.method].settings
+    return {key: setting.default for key, setting in known.items()} | dict(choice.settings)
+
+
+def check_choice(choice: Choice, where: str) -> None:
+    """InputError for an unknown method or setting, or a value that is not right."""
+    if choice.method not in METHODS:
+        raise InputError(f"{where}: method: {choice.method!r} is not one of {', '.join(METHODS)}")
+    known = METHODS[choice.method].settings
+    for key, value in choice.settings:
+        if key not in known:
+            raise InputError(f"{where}: unknown setting {key!r}; {choice.method} takes {', '.join(known)}")
+        if not known[key].valid(value):
+            raise InputError(f"{where}: {key}: is {value!r}; {known[key].right}")
+
+
+def see(command: Wheels, pose: Pose, period: Array) -> Sight:
+    """What estimators see of commands and measured poses (samples,) at an even period [s]."""
+    rows = jnp.arange(len(pose.x))
+    log = Log(rows * period, *command, *pose, jnp.zeros_like(rows))
+
+    @functools.cache
+    def setup(count: int, reading: str, d_max_share: float) -> Setup:
+        early = observe_log(Log(*(column[:count] for column in log)))
+        return initialise(early, d_max=d_max_share * largest, reading=reading)
+
+    largest = jnp.max(jnp.abs(jnp.stack(command)))
+    return Sight(log, complete_observations(command, path_length(pose)), setup, largest)
+
+
+def estimate(choice: Choice, sight: Sight, moves: Array) -> Finding:
+    """Run one estimator; numbers of a failed estimate are NaN, so that nothing can average them. A robot that never
+    moves (`moves`) fails whatever is found in the camera's noise."""
+    found = METHODS[choice.method].run(sight, settings_of(choice))
+    finite = jnp.all(jnp.isfinite(found.estimate))
+    reason = jnp.where(found.reason != FOUND, found.reason, jnp.where(finite, FOUND, NOT_FINITE))
+    reason = jnp.where(moves, reason, AT_REST).astype(jnp.int8)
+    value, deviation = (jnp.where(reason == FOUND, part, jnp.nan) for part in (found.estimate, found.deviation))
+    return Finding(value, deviation, reason)
+
+
+def batch(sight: Sight, settings: dict[str, Any]) -> Finding:
+    """PAPER section VI on the first rows (default: all): linear least squares, then the nonlinear cost (21)."""
+    rows = len(sight.log.t)
+    first, setup, variance = _start(sight, settings, settings["setup_samples"] or rows, 1.0)
+    return _finding(first, setup, variance)
+
+
+def recursively(sight: Sight, settings: dict[str, Any]) -> Finding:
+    """The paper's estimator: `batch` on the setup time (default: 200 rows or three tenths), then (15)-(18)."""
+    rows = len(sight.log.t)
+    count = settings["setup_samples"] or max(SETUP_SAMPLES, int(SETUP_SHARE * rows))
+    first, setup, variance = _start(sight, settings, count, settings["forgetting"])
+    late = recursive.tail(sight.observations, min(rows, count) - 2)
+    if not len(late.command.right):
+        return _finding(first, setup, variance)
+
+    def body(carry, sample):
+        estimate, squares = carry
+        estimate, info = recursive.absorb(estimate, sample)
+        return (estimate, squares + jnp.stack([e * e / s for e, s in zip(info.error, info.scale, strict=True)])), None
+
+    (last, squares), _ = jax.lax.scan(body, (first, jnp.zeros(2)), late)
+    return _finding(last, setup, squares / len(late.command.right))
+
+
+def _start(sight: Sight, settings: dict[str, Any], count: int, forgetting: float):
+    """The recursion at the end of the setup time, the setup itself, and the variance (2,) of its residuals."""
+    count = min(count, len(sight.log.t))
+    setup = sight.setup(count, settings["reading"], settings["d_max_share"])
+    early = jax.tree.map(lambda column: column[: count - 2], sight.observations)
+    d_max = settings["d_max_share"] * sight.largest
+    first = recursive.start(setup.difference, setup.dead_zone, early, d_max, forgetting)
+    whole = observe_log(Log(*(column[:count] for column in sight.log)))
+    point = jnp.concatenate([setup.dead_zone, setup.difference.alpha])
+    left = project(reading_of(whole, settings["reading"]), whole, point).residual
+    spare = jnp.maximum(jnp.sum(usable(whole)) - UNKNOWNS_OF_ONE_CHANNEL, 1)
+    return first, setup, jnp.sum(left**2, axis=1) / spare
+
+
+def _finding(last: recursive.Estimate, setup: Setup, variance: Array) -> Finding:
+    covariance = parameter_covariance(last, Increment(variance[0], variance[1]))
+    deviation = jnp.sqrt(jnp.maximum(jnp.diagonal(covariance), 0.0))
+    reason = jnp.where(setup.ok, FOUND, NO_START)
+    return Finding(difference_vector(*recursive.parameters(last)), deviation, reason)
+
+
+def _number(low: float, high: float) -> Callable[[Any], bool]:
+    return lambda value: not isinstance(value, bool) and isinstance(value, int | float) and low < value <= high
+
+
+_PAPER = {
+    "setup_samples": Setting(
+        0,
+        lambda value: type(value) is int and (value == 0 or value >= SMALLEST_LOG),
+        f"0 (the default rule) or a whole number of rows from {SMALLEST_LOG} on",
+    ),
+    "reading": Setting("one_step", lambda value: value in NAMES, f"one of {', '.join(NAMES)}"),
+    "d_max_share": Setting(D_MAX_SHARE, _number(0.0, 0.999), "a number above 0 and below 1"),
+}
+METHODS = {
+    "batch": Method(batch, _PAPER),
+    "recursive": Method(
+        recursively,
+        _PAPER | {"forgetting": Setting(1.0, _number(0.0, 1.0), "a number above 0 and at most 1")},
+    ),
+}
+"""Every estimator by name."""
