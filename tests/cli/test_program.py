@@ -118,13 +118,18 @@ def test_model_at_another_period_is_refused(folder):
         ("t,u_r,u_l,x,y,theta\n" + "".join(f"{k},{k % 3},1,,,\n" for k in range(40)), ["poses"]),
         ("t,u_r,u_l,x,y,theta\n" + "".join(f"{k},{k % 3},1,0,0,0\n" for k in range(40)), ["nothing moves"]),
         ("t,u_r,u_l,x,y,theta\n" + "".join(f"{k},1,1,{k},0,0\n" for k in range(40)), ["no excitation"]),
-        ("t,u_r,u_l,x,y,theta\n" + "".join(f"{k + (k == 9) / 3},{k % 3},1,{k},0,0\n" for k in range(40)), ["uneven"]),
     ],
 )
 def test_bad_logs(tmp_path, body, words):
     (tmp_path / "bad.csv").write_text(body)
     refused(jaxident("identify", "bad.csv", "--out", "model.json", cwd=tmp_path), *words)
     assert [path.name for path in tmp_path.iterdir()] == ["bad.csv"]
+
+
+def test_the_papers_method_refuses_uneven_steps(tmp_path):
+    rows = (f"{k + (k == 9) / 3},{k % 3},1,{k},0,0\n" for k in range(40))
+    (tmp_path / "bad.csv").write_text("t,u_r,u_l,x,y,theta\n" + "".join(rows))
+    refused(jaxident("identify", "bad.csv", "--method", "paper", cwd=tmp_path), "uneven")
 
 
 def test_model_with_an_unknown_key(tmp_path, folder):
