@@ -21,6 +21,13 @@ NOTES = {
     "--method", type=click.Choice(["maximum-likelihood", "paper"]), default="maximum-likelihood", show_default=True
 )
 @click.option(
+    "--noise-law",
+    type=click.Choice(["white", "ar1", "slip", "slip-ar1", "auto"]),
+    default="white",
+    show_default=True,
+    help="What is random: white camera error, one with a memory, slip of the wheels; auto tries them (minutes).",
+)
+@click.option(
     "--setup-time", type=click.FloatRange(0, min_open=True), metavar="S", help="Seconds for the start values (paper)."
 )
 @click.option("--forgetting", type=float, metavar="F", help="In (0, 1]; 1, the default, forgets nothing.")
@@ -32,7 +39,7 @@ NOTES = {
 )
 @click.option("--out", metavar="MODEL", help="The model file to write.")
 @json_option
-def command(logs, method, setup_time, forgetting, d_max, reading, out, json_file):
+def command(logs, method, noise_law, setup_time, forgetting, d_max, reading, out, json_file):
     """The model behind one or several logs (files, folders, or `-`), runs in the order given.
 
     Example: jaxident identify log.csv --out model.json
@@ -46,7 +53,7 @@ def command(logs, method, setup_time, forgetting, d_max, reading, out, json_file
     from jaxident.robot.model import Provenance
 
     records = read_logs(logs)
-    settings = {"setup_time": setup_time, "forgetting": forgetting, "d_max": d_max}
+    settings = {"noise_law": noise_law, "setup_time": setup_time, "forgetting": forgetting, "d_max": d_max}
     with working("identifying"):
         found = identify(records, method, reading=reading and reading.replace("-", "_"), **settings)
     origin = Provenance(jaxident.__version__, method, tuple(logs))
@@ -54,6 +61,8 @@ def command(logs, method, setup_time, forgetting, d_max, reading, out, json_file
     rows = verdicts(model, max(float(abs(u).max()) for record in records for u in record.command))
     click.echo(table([("parameter", "estimate", "95 % interval", "this input"), *(row.cells() for row in rows)]))
     click.echo(NOTES[method])
+    for line in found.suspicions:
+        click.echo(f"warning: {line}", err=True)
     if not bool(found.ok):
         click.echo(
             "warning: the fit did not converge: do not trust these numbers before you have looked at the log",
@@ -62,4 +71,7 @@ def command(logs, method, setup_time, forgetting, d_max, reading, out, json_file
     if out:
         save_model(model, out)
         wrote(out)
-    write_json({"model": model_to_dict(model), "parameters": [row._asdict() for row in rows]}, json_file)
+    write_json(
+        {"model": model_to_dict(model), "parameters": [row._asdict() for row in rows], "suspicions": found.suspicions},
+        json_file,
+    )

@@ -42,7 +42,8 @@ class Identification(NamedTuple):
     whether every stage converged.
 
     By maximum likelihood: residuals a `Pose` [m], [rad] (rows,), and the fit. By the paper: one-step residuals an
-    `Increment` [m], [rad] (samples,), and how the recursion came about.
+    `Increment` [m], [rad] (samples,), and how the recursion came about. suspicions: what the log says against the
+    method's assumptions, a line each.
     """
 
     model: Model
@@ -52,13 +53,14 @@ class Identification(NamedTuple):
     fit: Fit | None = None
     setup: Any = None
     history: Any = None
+    suspicions: tuple[str, ...] = ()
 
 
 def identify(
     logs: Log | Sequence[Log],
     method: str = "maximum-likelihood",
     *,
-    noise_law: str = "auto",
+    noise_law: str = "white",
     coupling: bool = False,
     setup_time: float | None = None,
     forgetting: float | None = None,
@@ -90,7 +92,9 @@ def identify(
     for name in [name for name, value in given.items() if value is not None]:
         raise InputError(f"{name}: a setting of the method 'paper'; maximum likelihood has none such")
     found = identify_poses(log, d_max, noise_law, coupling)
-    return Identification(found.model, found.model.covariance, found.residuals, found.fit.ok, fit=found.fit)
+    return Identification(
+        found.model, found.model.covariance, found.residuals, found.fit.ok, fit=found.fit, suspicions=found.suspicions
+    )
 
 
 def _identify_as_paper(

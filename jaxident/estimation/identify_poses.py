@@ -9,7 +9,7 @@ import numpy as np
 from jaxident.array_types import Pose
 from jaxident.errors import InputError, WorkError
 from jaxident.estimation.maximum_likelihood import Fit
-from jaxident.estimation.noise_law import fit_law
+from jaxident.estimation.noise_law import WHITE, fit_law, whiteness
 from jaxident.estimation.parameters import Law, names, to_vector
 from jaxident.estimation.precision import difference_covariance, spread_of
 from jaxident.estimation.runs import Runs, stack_runs
@@ -21,12 +21,14 @@ SMALLEST_LOG = 20
 
 
 class PoseFit(NamedTuple):
-    """A model, the residuals [m], [m], [rad] (rows,) of the log, NaN where no pose was, the fit and its law."""
+    """A model, the residuals [m], [m], [rad] (rows,) of the log, NaN where no pose was, the fit and its law, and what
+    speaks against that law, a line each."""
 
     model: Model
     residuals: Pose
     fit: Fit
     law: Law
+    suspicions: tuple[str, ...]
 
 
 def identify_poses(log: Log, d_max: float, noise_law: str, coupling: bool) -> PoseFit:
@@ -43,7 +45,9 @@ def identify_poses(log: Log, d_max: float, noise_law: str, coupling: bool) -> Po
     fit, law = fit_law(jax.tree.map(jnp.asarray, runs), jnp.asarray(d_max), noise_law, coupling)
     if not all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves((fit.robot, fit.covariance))):
         raise WorkError("the maximum-likelihood estimate is not finite: the log does not determine the model")
-    return PoseFit(_model(fit, law, float(np.median(_steps(log)))), _residuals(fit, runs, log), fit, law)
+    return PoseFit(
+        _model(fit, law, float(np.median(_steps(log)))), _residuals(fit, runs, log), fit, law, _suspicions(fit, runs)
+    )
 
 
 def _with_commands(log: Log) -> Log:
@@ -73,6 +77,17 @@ def _model(fit: Fit, law: Law, period: float) -> Model:
         covariance=fit.covariance,
         parameter_order=names(law),
         provenance=Provenance(method="maximum-likelihood"),
+    )
+
+
+def _suspicions(fit: Fit, runs: Runs) -> tuple[str, ...]:
+    """A line where the residuals are not white: the intervals are then too narrow."""
+    found = float(whiteness(fit.innovations.normalised, jnp.asarray(runs.seen)))
+    if found < WHITE:
+        return ()
+    return (
+        f"residuals are coloured ({found:.0f}, white ones below {WHITE}): intervals are too narrow; "
+        "the noise law 'auto' tries slip and a camera error with a memory",
     )
 
 

@@ -25,6 +25,7 @@ TOLERANCE = 1e-7
 KINK_STEP, KINK_TOLERANCE = 1e-2, 1e-4
 """At a kink: steps of dead zones below this many standard deviations fail, and the rest promises less than this."""
 DEAD_ZONES = slice(6, 8)
+STUCK, LOOSENED = 1e4, 1e-8
 LONGEST_LOG_STEP, LONGEST_SHARE = 1.5, 0.25
 """A step changes a logarithm by at most this much, and a dead zone by this share of its bound."""
 
@@ -133,12 +134,17 @@ def rescale(point: Point, runs: Runs, law: Law) -> Point:
 
 def eliminate(local: Local, damping: Array, held: Array) -> tuple[Array, Array, Array]:
     """The curvature of the shared unknowns with the start states eliminated, its gradient, and the elimination
-    (runs, 5, unknowns + 1); `held` unknowns (unknowns,) stay where they are."""
+    (runs, 5, unknowns + 1); `held` unknowns (unknowns,) stay where they are.
+
+    Where damping has grown past STUCK a dead zone sits at a kink: it alone stays damped, and the rest moves on.
+    """
     free = jnp.where(held, 0.0, 1.0)
     shared = local.shared * free[:, None] * free + jnp.diag(1.0 - free)
-    shared = shared + damping * jnp.diag(jnp.diagonal(shared))
+    gentle = jnp.where(damping < STUCK, damping, damping * LOOSENED)
+    own = jnp.full(len(held), gentle).at[DEAD_ZONES].set(damping)
+    shared = shared + jnp.diag(own * jnp.diagonal(shared))
     diagonal = jnp.diagonal(local.starts, axis1=1, axis2=2)
-    starts = local.starts + jax.vmap(jnp.diag)(damping * diagonal + 1e-12 * jnp.max(diagonal, axis=1, keepdims=True))
+    starts = local.starts + jax.vmap(jnp.diag)(gentle * diagonal + 1e-12 * jnp.max(diagonal, axis=1, keepdims=True))
     between = local.between * free[:, None]
     right = jnp.concatenate([between.transpose(0, 2, 1), local.gradient.starts[:, :, None]], axis=2)
     solved = jnp.linalg.solve(starts, right)
@@ -186,7 +192,7 @@ def search_from(point: Point, runs: Runs, law: Law, d_max: Array, most: int) -> 
         local = local_at(there, runs, law)
         better = (local.value <= search.local.value) | (search.steps == 0)
         point, local = jax.tree.map(lambda a, b: jnp.where(better, a, b), (there, local), (search.point, search.local))
-        damping = jnp.maximum(search.damping * jnp.where(better, EASE, STIFFEN), 1e-9)
+        damping = jnp.maximum(search.damping * jnp.where(better, EASE, STIFFEN), 1e-6)
         proposed, arrived = propose(point, local, damping, law, low, high)
         return Search(point, local, proposed, damping, search.steps + 1, arrived)
 

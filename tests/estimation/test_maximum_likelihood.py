@@ -134,11 +134,17 @@ def test_batch_is_the_loop_and_compiles_once():
     assert compiled._cache_size() == 1
 
 
+def test_coloured_residuals_are_suspected():
+    assert "coloured" in identify(logged(4, Noise(1e-3, 1e-2, 0.3), 400)).suspicions[0]
+    assert identify(logged(4, Noise(1e-3, 1e-2), 400)).suspicions == ()
+
+
+@pytest.mark.slow
 def test_auto_finds_the_noise_law():
-    memory = identify(logged(4, Noise(1e-3, 1e-2, 0.3), 400))
+    memory = identify(logged(4, Noise(1e-3, 1e-2, 0.3), 400), noise_law="auto")
     assert memory.model.noise.correlation_time == pytest.approx(0.3, rel=0.5)
     assert memory.model.noise.slip_along == 0.0
-    white = identify(logged(4, Noise(1e-3, 1e-2), 400))
+    white = identify(logged(4, Noise(1e-3, 1e-2), 400), noise_law="auto")
     assert white.model.noise.correlation_time is None
     assert white.model.noise.position == pytest.approx(1e-3, rel=0.15)
 
