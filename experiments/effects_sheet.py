@@ -4,7 +4,8 @@
 
 The published robot at each effect's typical size and the nominal one under the same commands: what a tenth of a second
 takes the one further than the other, each in the frame of its own pose at the start, against command, speed, heading,
-position and time. One picture per effect, and one sheet of all.
+position and time. Along and lateral stand against the mean command and v, heading against half the difference of the
+commands and w. One picture per effect, and one sheet of all.
 """
 
 import argparse
@@ -69,8 +70,8 @@ def main() -> None:
     u_r, u_l = (np.asarray(u)[rows] for u in log.command)
     v, w = (motion[:, k] / np.abs(motion[:, k]).max() for k in (0, 2))
     regressors = {
-        "command: mean, for heading half difference": channels((u_r + u_l) / 2, (u_r - u_l) / 2),
-        "speed over its largest: $v$, for heading $w$": channels(v, w),
+        "command [unit]": channels((u_r + u_l) / 2, (u_r - u_l) / 2),
+        "speed over its largest": channels(v, w),
         "heading [rad]": channels(np.mod(nominal[rows, 2], 2 * np.pi)),
         "position $x$ [m]": channels(nominal[rows, 0]),
         "time [s]": channels(np.asarray(log.t)[rows]),
