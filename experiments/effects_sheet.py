@@ -4,11 +4,11 @@
 
 The published robot at each effect's typical size and the nominal one under the same commands: what a tenth of a second
 takes the one further than the other, each in the frame of its own pose at the start, against command, speed, heading,
-position and time. One picture per effect, and one sheet of all.
+position and time. Along and lateral stand against the mean command and v, heading against half the difference of the
+commands and w. One picture per effect, and one sheet of all.
 """
 
 import argparse
-import functools
 import pathlib
 
 import jax
@@ -24,16 +24,10 @@ ROWS, HOLD, HORIZON = 601, 15, 3
 AMPLITUDE = 1.0
 
 
-@functools.partial(jax.jit, static_argnums=0)
-def poses(robot_index: int, vector, t, command, start, key):
-    """Reported poses (samples, 3); `robot_index` keeps one program per robot."""
-    robot = ROBOTS[robot_index]
-    width = jnp.asarray(robot.dead_zone)
-    pose = run_full(robot.physical, width, vector, t, command, start, key=key, substeps=8)
-    return jnp.stack(pose, axis=1)
-
-
-ROBOTS = [ji.load_model("published")]
+@jax.jit
+def poses(drive, width, vector, t, command, start, key):
+    """Reported poses (samples, 3)."""
+    return jnp.stack(run_full(drive, width, vector, t, command, start, key=key), axis=1)
 
 
 def departures(path: np.ndarray, nominal: np.ndarray) -> dict[str, np.ndarray]:
@@ -62,18 +56,22 @@ def main() -> None:
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("effects_sheet"))
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
-    robot = ROBOTS[0]
+    robot = ji.load_model("published")
     log = excite(jax.random.key(2), "multilevel", ROWS, robot.sample_period, amplitude=AMPLITUDE, hold=HOLD)
     key, start = jax.random.key(1), ji.State(0.0, 0.0, 0.0, 0.0, 0.0)
-    run = functools.partial(poses, 0, t=jnp.asarray(log.t), command=log.command, start=start, key=key)
+    body = robot.physical, jnp.asarray(robot.dead_zone)
+
+    def run(vector):
+        return poses(*body, vector, jnp.asarray(log.t), log.command, start, key)
+
     nominal = np.asarray(run(jnp.asarray(NEUTRAL)))
     motion = local_motion(nominal)
     rows = slice(0, ROWS - HORIZON)
     u_r, u_l = (np.asarray(u)[rows] for u in log.command)
     v, w = (motion[:, k] / np.abs(motion[:, k]).max() for k in (0, 2))
     regressors = {
-        "command: mean, for heading half difference": channels((u_r + u_l) / 2, (u_r - u_l) / 2),
-        "speed over its largest: $v$, for heading $w$": channels(v, w),
+        "command [unit]": channels((u_r + u_l) / 2, (u_r - u_l) / 2),
+        "speed over its largest": channels(v, w),
         "heading [rad]": channels(np.mod(nominal[rows, 2], 2 * np.pi)),
         "position $x$ [m]": channels(nominal[rows, 0]),
         "time [s]": channels(np.asarray(log.t)[rows]),

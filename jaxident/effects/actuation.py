@@ -75,9 +75,9 @@ def motor_lag(last: Array, m: Array, step: Array, time_constant: Array) -> tuple
     kept = safe_divide(once, step, 1.0)
     moment = safe_divide(step * once - twice, step * step, 0.5) - 0.5 * kept
     first = safe_divide(time_constant, step, 0.0)  # the limit of `kept`, which gives the derivative at no lag
-    decay, kept, moment = (
-        jnp.where(lagging, value, limit) for value, limit in ((decay, 0.0), (kept, first), (moment, -0.5 * first))
-    )
+    still = jnp.where(step > 0.0, 0.0, 1.0)  # no time, no change: else a step of length zero would hide a switch
+    limits = (decay, still), (kept, first), (moment, -0.5 * first)
+    decay, kept, moment = (jnp.where(lagging, value, limit) for value, limit in limits)
     gap = last - m
     return m + gap * decay, m + gap * kept, 12.0 * moment * gap, kept
 

@@ -35,10 +35,10 @@ def effect_signature(
                     "linestyle": "none",
                     "marker": ".",
                     "markersize": 1.6,
-                    "alpha": 0.45,
+                    "alpha": 0.7,
                     "markeredgewidth": 0.0,
                 }
-                text = f"{name}, ±{sizes[name]:.2g} {unit}"
+                text = f"{name}, ±{sizes[name]:.3g} {unit}"
                 ax.plot(regressor[name], values / sizes[name], color=colour, label=text, rasterized=True, **dots)
         ax.set_ylim(-1.15, 1.15)
         ax.set_yticks([-1.0, 0.0, 1.0], labels=[])
