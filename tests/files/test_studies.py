@@ -1,0 +1,77 @@
+"""Study files: the example reads, what is wrong is named."""
+
+import re
+
+import numpy as np
+import pytest
+from support.studies import SMALL, SMALL_TOML
+
+from jaxident.errors import InputError
+from jaxident.files.models import save_model
+from jaxident.files.studies import EXAMPLE, parse_study, read_study
+from jaxident.study.dataset import describe
+
+
+def test_a_file_is_its_study():
+    assert describe(parse_study(SMALL_TOML, "study.toml")) == describe(SMALL)
+
+
+def test_the_example_reads_with_and_without_its_comments():
+    study = parse_study(EXAMPLE, "study.toml")
+    assert study.shape == (2, 1, 1, 1, 1, 4, 50)
+    every = parse_study(re.sub(r"^# (?=\w+ = )", "", EXAMPLE, flags=re.MULTILINE), "study.toml")
+    assert len(every.robots) == 3
+    assert every.period == (0.0333, 0.1)
+    assert every.correlation_time == 0.5
+
+
+def test_a_grid_of_robots(tmp_path):
+    save_model(SMALL.robots[0].model, tmp_path / "mine.json")
+    text = SMALL_TOML.replace(
+        'model = "published", spread = { gain = 0.2, dead_zone = 0.1 }',
+        'model = "mine.json", name = "mine", scale = { dead_zone = [0.5, 2.0], rate = [1.0, 3.0] }',
+    )
+    (tmp_path / "study.toml").write_text(text)
+    study = read_study(tmp_path / "study.toml")
+    assert [robot.name for robot in study.robots] == [
+        "mine ratex1 dead_zonex0.5", "mine ratex1 dead_zonex2", "mine ratex3 dead_zonex0.5", "mine ratex3 dead_zonex2",
+    ]  # fmt: skip
+    np.testing.assert_allclose(study.robots[3].model.dead_zone, [0.5, 0.4])
+    np.testing.assert_allclose(
+        study.robots[3].model.dynamics.rate, 3.0 * np.asarray(SMALL.robots[0].model.dynamics.rate)
+    )
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("seeds = 6", "seeds = 6\nsedes = 7", ["unknown key 'sedes'"]),
+        ("seeds = 6", "", ["no key 'seeds'"]),
+        ("seeds = 6", "seeds = 6.5", ["seeds", "whole"]),
+        ("seeds = 6", "seeds = true", ["seeds", "number"]),
+        ("noise = [1e-6, 1e-4]", "noise = []", ["noise", "empty"]),
+        ("noise = [1e-6, 1e-4]", "noise = 1e-6", ["noise", "list"]),
+        ("noise = [1e-6, 1e-4]", "noise = [-1e-6]", ["noise", "negative"]),
+        ("noise = [1e-6, 1e-4]", "noise = [inf]", ["noise[0]", "finite"]),
+        ('["batch"]', '["kalman"]', ["kalman", "batch, recursive"]),
+        ('["batch"]', '[{ method = "batch", settings = { reading = "x" } }]', ["reading", "one_step"]),
+        ('["batch"]', '["batch", "batch"]', ["estimators", "twice"]),
+        ("gain = 0.2", "mass = 0.2", ["robots[0]", "spread", "mass"]),
+        ("gain = 0.2", "gain = 2.0", ["spread", "below 1"]),
+        ('"published"', '"nobody"', ["robots[0]", "nobody", "no such file"]),
+        ("spread = { gain = 0.2, dead_zone = 0.1 }", "scale = { gain = [] }", ["scale.gain", "empty"]),
+        ("hold = 3", "hold = = 3", ["not TOML", "line"]),
+    ],
+)
+def test_what_is_wrong_is_named(old, new, words):
+    assert old in SMALL_TOML
+    with pytest.raises(InputError) as error:
+        parse_study(SMALL_TOML.replace(old, new), "study.toml")
+    assert str(error.value).startswith("study.toml: ")
+    for word in words:
+        assert word in str(error.value)
+
+
+def test_a_file_that_is_not_there():
+    with pytest.raises(InputError, match="no such file"):
+        read_study("nowhere.toml")

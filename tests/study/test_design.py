@@ -1,0 +1,59 @@
+"""A study that makes no sense is refused in one line that names the key."""
+
+import dataclasses
+
+import pytest
+from support.studies import ROBOT, SMALL
+
+from jaxident.errors import InputError
+from jaxident.robot.model import Effect
+from jaxident.study.design import Candidate, check_study
+from jaxident.study.estimators import Choice, settings_of
+
+
+def test_shape_counts_trials():
+    check_study(SMALL)
+    assert SMALL.shape == (1, 1, 1, 1, 1, 2, 6)
+    assert SMALL.trials == 12
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"noise": ()}, ["noise", "empty"]),
+        ({"noise": (1e-3, -1e-3)}, ["noise", "-0.001", "negative"]),
+        ({"noise": (float("nan"),)}, ["noise", "finite"]),
+        ({"noise": (1e-3, 1e-3)}, ["noise", "twice"]),
+        ({"excitations": ("staircase", "sawtooth")}, ["excitations", "sawtooth", "multisine"]),
+        ({"amplitude": (0.0,)}, ["amplitude", "0"]),
+        ({"period": (-0.1,)}, ["period", "-0.1"]),
+        ({"samples": (5,)}, ["samples", "5", "20"]),
+        ({"seeds": 0}, ["seeds", "at least 1"]),
+        ({"chunk": 0}, ["chunk", "at least 1"]),
+        ({"heading_per_position": -1.0}, ["heading_per_position"]),
+        ({"correlation_time": 0.0}, ["correlation_time"]),
+        ({"estimators": ()}, ["estimators", "empty"]),
+        ({"estimators": (Choice("mine", "kalman"),)}, ["mine", "kalman", "recursive"]),
+        ({"estimators": (Choice("mine", "batch", (("memory", 3),)),)}, ["memory", "setup_samples"]),
+        ({"estimators": (Choice("mine", "recursive", (("forgetting", 1.5),)),)}, ["forgetting", "1.5", "at most 1"]),
+        ({"robots": (Candidate("wide", ROBOT, (1.0, 0.0, 0.0, 0.0)),)}, ["wide", "spread", "below 1"]),
+        ({"robots": (Candidate("free", dataclasses.replace(ROBOT, dynamics=ROBOT.difference)),)}, ["free", "physical"]),
+        (
+            {"robots": (Candidate("odd", dataclasses.replace(ROBOT, effects=(Effect("backlash", {}),))),)},
+            ["odd", "effects"],
+        ),
+    ],
+)
+def test_what_makes_no_sense_is_refused(change, words):
+    with pytest.raises(InputError) as error:
+        check_study(SMALL._replace(**change), "study.toml")
+    assert str(error.value).startswith("study.toml: ")
+    assert "\n" not in str(error.value)
+    for word in words:
+        assert word in str(error.value)
+
+
+def test_settings_are_defaults_and_what_is_given():
+    settings = settings_of(Choice("mine", "recursive", (("forgetting", 0.99),)))
+    assert settings["forgetting"] == 0.99
+    assert settings["reading"] == "one_step"

@@ -1,0 +1,32 @@
+"""A study so small that its compiled program is most of its time; all tests share that program."""
+
+from jaxident.files.models import load_model
+from jaxident.study.design import Candidate, Study
+from jaxident.study.estimators import Choice
+
+ROBOT = load_model("published")
+
+SMALL = Study(
+    robots=(Candidate("published", ROBOT, (0.0, 0.2, 0.0, 0.1)),),
+    estimators=(Choice("batch", "batch"),),
+    seeds=6,
+    noise=(1e-6, 1e-4),
+    excitations=("staircase",),
+    samples=(60,),
+    hold=3,
+    chunk=4,
+)
+"""Two noise levels, six seeds, chunks of four and two trials."""
+
+SMALL_TOML = """
+name = "study"
+seeds = 6
+noise = [1e-6, 1e-4]
+excitations = ["staircase"]
+samples = [60]
+hold = 3
+chunk = 4
+robots = [{ model = "published", spread = { gain = 0.2, dead_zone = 0.1 } }]
+estimators = ["batch"]
+"""
+"""The same as a file."""
