@@ -58,11 +58,13 @@ def move(settings, drive: Physical, state: State, push: Push, slip: Force, chang
     def departure(part: float, now: Motion) -> Motion:
         return _departure(settings, drive, now, pull, Force(*((part - 0.5) * f for f in ramp)), lightness)
 
-    first, last, d = _runge_kutta(drive, departure, state, pull, solved)
-    rubbed = _friction(settings, drive, state, pull, d, lightness, solved)
-    pull = Force(pull.along + rubbed.along, pull.heading + rubbed.heading)
-    end = _nominal(solved.end, state, pull)
-    x, y = _travel(settings, state, pull, (first, last, d), solved)
+    rubbed = pull
+    for _ in range(2):  # friction moves what the departure depends on, and the other way round
+        first, last, d = _runge_kutta(drive, departure, state, rubbed, solved)
+        friction = _friction(settings, drive, state, pull, d, lightness, solved)
+        rubbed = Force(pull.along + friction.along, pull.heading + friction.heading)
+    end = _nominal(solved.end, state, rubbed)
+    x, y = _travel(settings, state, rubbed, (first, last, d), solved)
     return State(state.x + solved.step * x, state.y + solved.step * y, end.theta + d.theta, end.v + d.v, end.w + d.w)
 
 
