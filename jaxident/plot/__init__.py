@@ -16,6 +16,7 @@ _HOMES = {
     "convergence": "estimates",
     "tracking": "estimates",
     "error_against_noise": "estimates",
+    "estimate_errors": "studies",
     "heat_map": "studies",
     "error_curves": "studies",
     "error_histogram": "studies",

@@ -4,6 +4,7 @@ Only this process writes: workers return arrays, and need neither the study's fo
 """
 
 import contextlib
+import logging
 import re
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -41,7 +42,7 @@ def connected(scheduler: str) -> Iterator[Any]:
                 threads_per_worker=1,
                 host="127.0.0.1",
                 dashboard_address=None,
-                silence_logs="critical",
+                silence_logs=logging.CRITICAL,
                 env={"XLA_FLAGS": WITHOUT_THREADS},
             )
             scheduler = stack.enter_context(settings).scheduler_address
