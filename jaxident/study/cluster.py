@@ -21,7 +21,6 @@ AHEAD = 2
 
 RETRIES = 3
 PATIENCE = "20s"
-WITHOUT_THREADS = "--xla_cpu_multi_thread_eigen=false"
 
 
 @contextlib.contextmanager
@@ -43,7 +42,6 @@ def connected(scheduler: str) -> Iterator[Any]:
                 host="127.0.0.1",
                 dashboard_address=None,
                 silence_logs=logging.CRITICAL,
-                env={"XLA_FLAGS": WITHOUT_THREADS},
             )
             scheduler = stack.enter_context(settings).scheduler_address
         try:
@@ -69,7 +67,7 @@ def run_on(client: Any, study: Study, numbers: Sequence[int]) -> Iterator[tuple[
         batch = [number for number, _ in zip(waiting, range(count), strict=False)]
         return [client.submit(_task, whole, number, ours, pure=False, retries=RETRIES) for number in batch]
 
-    running = as_completed(submit(AHEAD * workers))
+    running = as_completed(submit(AHEAD * workers), loop=client.loop)
     try:
         for future in running:
             number, outcome = future.result()
