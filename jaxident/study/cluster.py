@@ -4,6 +4,7 @@ Only this process writes: workers return arrays, and need neither the study's fo
 """
 
 import contextlib
+import itertools
 import logging
 import re
 from collections.abc import Iterator, Sequence
@@ -64,7 +65,7 @@ def run_on(client: Any, study: Study, numbers: Sequence[int]) -> Iterator[tuple[
     workers = max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
 
     def submit(count: int) -> list[Any]:
-        batch = [number for number, _ in zip(waiting, range(count), strict=False)]
+        batch = itertools.islice(waiting, count)
         return [client.submit(_task, whole, number, ours, pure=False, retries=RETRIES) for number in batch]
 
     running = as_completed(submit(AHEAD * workers), loop=client.loop)

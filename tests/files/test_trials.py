@@ -178,6 +178,13 @@ def test_a_full_disk_loses_nothing(tmp_path, finished, counted, monkeypatch):
     assert files(tmp_path) == finished
 
 
+def test_a_chunk_that_does_not_come_back_is_missed(tmp_path, monkeypatch):
+    monkeypatch.setattr(sweeps, "run_locally", lambda study, todo: iter(()))
+    with pytest.raises(WorkError, match="12 trials did not come back"):
+        sweep(SMALL, tmp_path)
+    assert not (tmp_path / "trials.zarr").exists()
+
+
 def test_memory_layout_is_one_file_per_chunk(finished):
     assert sum(name.startswith("estimate/0") for name in finished) == 4
     assert np.prod(SMALL.shape) == 12
