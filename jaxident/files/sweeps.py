@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import xarray
 
+from jaxident.errors import WorkError
 from jaxident.files.atomic import Target
 from jaxident.files.studies import read_study, study_from_dict
 from jaxident.files.trials import finish, missing, open_trials, opened, write_chunk
@@ -49,6 +50,9 @@ def sweep(study: Study, folder: Target, *, scheduler: str | None = None, told: T
             for number, outcome in run(study, todo):
                 write_chunk(store, number, outcome)
                 told.advance(_size(store.pieces[number]))
+                left -= _size(store.pieces[number])
+        if left:
+            raise WorkError(f"{folder}: {left} trials did not come back; the same command goes on with them")
         return finish(store)
 
 

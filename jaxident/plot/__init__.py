@@ -17,6 +17,7 @@ _HOMES = {
     "tracking": "estimates",
     "error_against_noise": "estimates",
     "effect_signature": "effects",
+    "estimate_errors": "studies",
     "heat_map": "studies",
     "error_curves": "studies",
     "error_histogram": "studies",

@@ -15,6 +15,12 @@ BINS = 40
 SHOWN_SHARE = 0.99
 """Share of the errors that a histogram's width takes in; the few beyond count in its outer bins."""
 
+BRIGHT = 0.5
+"""From here on a map's colour is bright enough for black text."""
+
+DEEPEST = 30.0
+"""The axis of errors goes down to this part of the lowest curve: a bias below it is none that anyone needs."""
+
 MAP = "cividis"
 """Colours of a map: even in brightness, and alike for colour-blind readers."""
 
@@ -54,6 +60,9 @@ def error_curves(
     if bound is not None:
         lowest = how.scale * np.asarray(bound, float)
         ax.plot(level, lowest, color=style.TRUE, linestyle="--", linewidth=style.LINE, label="Cramér-Rao bound")
+    lowest_curve = min((how.scale * np.nanmin(c.rmse) for c in curves.values() if np.any(c.rmse > 0.0)), default=0.0)
+    if lowest_curve > 0.0:
+        ax.set_ylim(bottom=max(ax.get_ylim()[0], lowest_curve / DEEPEST))
     ax.set(xlabel=f"camera noise in position [{unit}]", ylabel=f"error of {how.label}")
     style.legend_above(ax)
     return ax
@@ -72,12 +81,12 @@ def heat_map(values: Any, *, rows: Sequence[str], columns: Sequence[str], label:
     ax.imshow(np.where(values > 0.0, values, np.nan), cmap=MAP, norm=norm, aspect="auto")
     for (row, column), value in np.ndenumerate(values):
         if np.isfinite(value):
-            bright = value > 0.0 and norm(value) > 0.6
-            colour = style.BLACK if bright else "white"
-            ax.text(column, row, f"{value:.3g}", ha="center", va="center", color=colour, fontsize=style.TEXT - 1)
+            colour = style.BLACK if value > 0.0 and norm(value) > BRIGHT else "white"
+            text = f"{value:.0f}" if 1e2 <= value < 1e6 else f"{value:.3g}"
+            ax.text(column, row, text, ha="center", va="center", color=colour, fontsize=style.TEXT - 1)
     ax.set_xticks(range(len(columns)), columns)
     ax.set_yticks(range(len(rows)), rows)
-    ax.set_title(label, loc="left")
+    ax.set_title(label, loc="left", fontsize=style.TEXT)
     ax.grid(visible=False)
     ax.tick_params(length=0)
     for side in ax.spines.values():
@@ -95,20 +104,49 @@ def error_histogram(
     ax = style.axes_or_new(ax, (style.WIDTH, 2.8))
     how = written(label)
     kept = {name: how.scale * np.asarray(v, float)[np.isfinite(v)] for name, v in errors.items()}
-    width = max((np.quantile(np.abs(v), SHOWN_SHARE) for v in kept.values() if v.size), default=1.0) or 1.0
-    edges = np.linspace(-width, width, BINS + 1)
+    edges = _edges([v for v in kept.values() if v.size])
+    low, high = edges[0], edges[-1]
     for number, (name, values) in enumerate(kept.items()):
         if values.size:
-            heights = np.histogram(np.clip(values, -width, width), edges)[0] / (values.size * (edges[1] - edges[0]))
+            heights = np.histogram(np.clip(values, low, high), edges)[0] / (values.size * (edges[1] - edges[0]))
             colour = style.SERIES[number % len(style.SERIES)][0]
             ax.stairs(heights, edges, color=colour, fill=True, alpha=0.25)
             ax.stairs(heights, edges, color=colour, linewidth=style.LINE, label=name)
     ax.axvline(0.0, color=style.TRUE, linewidth=style.THIN, linestyle="--")
     if bound is not None:
         spread = how.scale * bound
-        x = np.linspace(-width, width, 400)
+        x = np.linspace(low, high, 400)
         density = np.exp(-0.5 * (x / spread) ** 2) / (spread * np.sqrt(2.0 * np.pi))
         ax.plot(x, density, color=style.TRUE, linewidth=style.LINE, label="Cramér-Rao bound")
-    ax.set(xlabel=f"error of {how.label}", yticks=[], xlim=(-width, width))
+    ax.set(xlabel=f"error of {how.label}", yticks=[], xlim=(low, high))
     style.legend_above(ax)
     return ax
+
+
+def estimate_errors(
+    estimates: Mapping[str, tuple[Any, Any]], *, truth: Any, names: Sequence[str], ax: Axes | None = None
+) -> Axes:
+    """Errors of one trial's estimates in per cent of the truth (parameters,), {estimator: (estimate, deviation)}, with
+    their 95 % intervals; beyond 1 % the axis is logarithmic. names: as in the model file."""
+    ax = style.axes_or_new(ax)
+    true = np.asarray(truth, float)
+    for number, (name, (estimate, deviation)) in enumerate(estimates.items()):
+        colour, marker = style.SERIES[number % len(style.SERIES)]
+        error, half = 100.0 * (np.asarray(estimate) / true - 1.0), np.abs(100.0 * BAND * np.asarray(deviation) / true)
+        place = np.arange(len(true)) + 0.2 * (number - 0.5 * (len(estimates) - 1))
+        look: dict[str, Any] = {"linestyle": "none", "marker": marker, "markersize": 3.5, "color": colour}
+        ax.errorbar(place, error, half, elinewidth=style.LINE, label=name, **look)
+    ax.axhline(0.0, color=style.TRUE, linewidth=style.THIN, linestyle="--")
+    ax.set_xticks(range(len(names)), [written(name).symbol for name in names])
+    ax.set(yscale="symlog", ylabel="error [%] with 95 % interval")
+    style.legend_above(ax)
+    return ax
+
+
+def _edges(errors: Sequence[np.ndarray]) -> np.ndarray:
+    """Edges of the bins: all of the errors but the few outermost, and zero."""
+    tail = 0.5 * (1.0 - SHOWN_SHARE)
+    ends = [0.0, *(end for values in errors for end in np.quantile(values, (tail, 1.0 - tail)))]
+    low, high = min(ends), max(ends)
+    margin = 0.05 * (high - low) or 1.0
+    return np.linspace(low - margin, high + margin, BINS + 1)

@@ -13,6 +13,7 @@ from jaxident.files.atomic import Target
 from jaxident.log import make_log
 from jaxident.plot.names import written
 from jaxident.plot.studies import Curve
+from jaxident.plot.style import legend_above
 from jaxident.report.page import Figure, Page, Section, Table, write_page
 from jaxident.robot.model import DIFFERENCE_ORDER
 from jaxident.robot.path_length import path_length
@@ -192,15 +193,12 @@ def draw_trial(study: Study, number: int, recording: Recording, outcome: Outcome
     plot.commands(measured.rows(0, SHOWN_ROWS), ax=axes[1], dead_zone=np.asarray(recording.robot.dead_zone))
     seen, true = (Increment(*(np.asarray(c)[:SHOWN_ROWS] for c in path_length(log.pose))) for log in (measured, exact))
     plot.increments(exact.t[1 : len(seen.turn) + 1], seen, true, ax=axes[2], channel="turn")
-    for k, choice in enumerate(study.estimators):
-        error = 100.0 * (outcome.estimate[k] / outcome.truth - 1.0)
-        place = np.arange(len(DIFFERENCE_ORDER)) + 0.15 * k
-        bar = np.abs(100.0 * 1.96 * outcome.deviation[k] / outcome.truth)
-        axes[3].errorbar(place, error, bar, linestyle="none", marker="os^Dv"[k % 5], markersize=4, label=choice.name)
-    axes[3].set_xticks(range(len(DIFFERENCE_ORDER)), [written(name).symbol for name in DIFFERENCE_ORDER])
-    axes[3].set(ylabel="error [%] with 95 % interval", yscale="symlog")
-    axes[3].legend(frameon=False, ncols=2)
-    axes[0].set_title(_title(study, number), loc="left")
+    axes[2].lines[1].set_label("without noise")
+    legend_above(axes[2])
+    pairs = zip(outcome.estimate, outcome.deviation, strict=True)
+    found = {choice.name: pair for choice, pair in zip(study.estimators, pairs, strict=True)}
+    plot.estimate_errors(found, truth=outcome.truth, names=DIFFERENCE_ORDER, ax=axes[3])
+    figure.suptitle(_title(study, number), x=0.01, ha="left", fontsize=9)
     return figure
 
 

@@ -4,6 +4,8 @@ Only this process writes: workers return arrays, and need neither the study's fo
 """
 
 import contextlib
+import itertools
+import logging
 import re
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -20,7 +22,6 @@ AHEAD = 2
 
 RETRIES = 3
 PATIENCE = "20s"
-WITHOUT_THREADS = "--xla_cpu_multi_thread_eigen=false"
 
 
 @contextlib.contextmanager
@@ -41,8 +42,7 @@ def connected(scheduler: str) -> Iterator[Any]:
                 threads_per_worker=1,
                 host="127.0.0.1",
                 dashboard_address=None,
-                silence_logs="critical",
-                env={"XLA_FLAGS": WITHOUT_THREADS},
+                silence_logs=logging.CRITICAL,
             )
             scheduler = stack.enter_context(settings).scheduler_address
         try:
@@ -65,10 +65,10 @@ def run_on(client: Any, study: Study, numbers: Sequence[int]) -> Iterator[tuple[
     workers = max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
 
     def submit(count: int) -> list[Any]:
-        batch = [number for number, _ in zip(waiting, range(count), strict=False)]
+        batch = itertools.islice(waiting, count)
         return [client.submit(_task, whole, number, ours, pure=False, retries=RETRIES) for number in batch]
 
-    running = as_completed(submit(AHEAD * workers))
+    running = as_completed(submit(AHEAD * workers), loop=client.loop)
     try:
         for future in running:
             number, outcome = future.result()

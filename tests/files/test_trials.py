@@ -139,7 +139,7 @@ def test_another_version_is_refused(tmp_path, monkeypatch):
         pass
     versions = trials.versions()
     monkeypatch.setattr(trials, "versions", lambda: versions | {"jaxident": "9.9"})
-    with pytest.raises(InputError, match="versions.jaxident"), opened(SMALL, tmp_path):
+    with pytest.raises(InputError, match=r"versions\.jaxident"), opened(SMALL, tmp_path):
         pass
 
 
@@ -163,7 +163,7 @@ def test_a_full_disk_loses_nothing(tmp_path, finished, counted, monkeypatch):
     real, calls = trials.zarr.open_group, []
 
     def full(*arguments, **settings):
-        calls.extend([settings] if "use_consolidated" in settings else [])
+        calls.extend([settings] if settings.get("use_consolidated") is False and settings["mode"] == "r+" else [])
         if len(calls) > 1:
             raise OSError(errno.ENOSPC, "No space left on device")
         return real(*arguments, **settings)
@@ -176,6 +176,13 @@ def test_a_full_disk_loses_nothing(tmp_path, finished, counted, monkeypatch):
     sweep(SMALL, tmp_path)
     assert counted == [1, 2, 3]
     assert files(tmp_path) == finished
+
+
+def test_a_chunk_that_does_not_come_back_is_missed(tmp_path, monkeypatch):
+    monkeypatch.setattr(sweeps, "run_locally", lambda study, todo: iter(()))
+    with pytest.raises(WorkError, match="12 trials did not come back"):
+        sweep(SMALL, tmp_path)
+    assert not (tmp_path / "trials.zarr").exists()
 
 
 def test_memory_layout_is_one_file_per_chunk(finished):
