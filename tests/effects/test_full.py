@@ -112,6 +112,7 @@ def somewhere():
     return vector.at[PLACE["transport_delay", "delay"]].set(0.05 + 1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("point", ["neutral", "off neutral"])
 def test_forward_and_reverse_derivatives_agree(point):
     vector = jnp.asarray(NEUTRAL) if point == "neutral" else somewhere()
