@@ -56,9 +56,12 @@ def predict(model: Model, log: Log, horizon: int, *, burn_in: int = 20, stride: 
 
     The start state (pose and speeds at the first of the last `burn_in` rows) is fitted to the poses up to the start
     by Gauss-Newton, each channel weighted by its noise: the model's, or the fit's own. Runs too short to start in
-    are left out; a free run ends with its run. InputError where no run is long enough. Needs double precision.
+    are left out; a free run ends with its run. InputError where no run is long enough, or for a model with effects,
+    which this prediction does not know. Needs double precision.
     """
     require_float64("predict")
+    if model.effects:
+        raise InputError(f"effect {model.effects[0].name!r}: prediction runs nominal models only")
     stride = horizon if stride is None else stride
     for name, value, least in (("horizon", horizon, 1), ("burn-in", burn_in, 1), ("stride", stride, 1)):
         if value < least:

@@ -11,6 +11,7 @@ from jaxident.errors import InputError
 from jaxident.estimation.predict import predict, prediction_error
 from jaxident.files.models import load_model
 from jaxident.log import Log, join
+from jaxident.robot.model import Effect
 from jaxident.robot.noise import Noise
 from jaxident.robot.simulate import simulate
 from jaxident.study.synthetic import excite
@@ -87,3 +88,6 @@ def test_what_cannot_be_predicted_says_why(log):
     ):
         with pytest.raises(InputError, match=words):
             predict(ROBOT, log, **settings)
+    delayed = dataclasses.replace(ROBOT, effects=(Effect("transport_delay", {"delay": 0.05}),))
+    with pytest.raises(InputError, match="transport_delay"):
+        predict(delayed, log, 5)
