@@ -16,10 +16,15 @@ from jaxident.errors import InputError
 from jaxident.estimation import recursive
 from jaxident.estimation.identify import D_MAX_SHARE, SETUP_SAMPLES, SETUP_SHARE, SMALLEST_LOG, parameter_covariance
 from jaxident.estimation.initialise import Setup, initialise
+from jaxident.estimation.maximum_likelihood import fit_runs
 from jaxident.estimation.observations import Observations, complete_observations, observe_log
+from jaxident.estimation.parameters import Law, to_vector
+from jaxident.estimation.precision import difference_covariance
 from jaxident.estimation.projection import project
 from jaxident.estimation.readings import NAMES, reading_of, usable
+from jaxident.estimation.runs import Runs
 from jaxident.log import Log
+from jaxident.robot.difference import to_difference
 from jaxident.robot.model import difference_vector
 from jaxident.robot.path_length import path_length
 
@@ -28,10 +33,11 @@ REASONS = (
     "the robot does not move",
     "no start values",
     "the estimate is not finite",
+    "the search did not arrive",
 )
 """How an estimate ended; its index is stored with every trial, 0 is success."""
 
-FOUND, AT_REST, NO_START, NOT_FINITE = range(4)
+FOUND, AT_REST, NO_START, NOT_FINITE, NOT_ARRIVED = range(5)
 
 UNKNOWNS_OF_ONE_CHANNEL = 6
 """Numbers that one channel's residuals determine: its pole, four numerator coefficients, its share of two widths."""
@@ -149,6 +155,18 @@ def recursively(sight: Sight, settings: dict[str, Any]) -> Finding:
     return _finding(last, setup, squares / len(late.command.right))
 
 
+def likelihood(sight: Sight, settings: dict[str, Any]) -> Finding:
+    """Maximum likelihood on the poses under white camera noise, in physical parameters."""
+    log, law = sight.log, Law()
+    period = log.t[1] - log.t[0]
+    command, pose = jax.tree.map(lambda column: column[None], (log.command, log.pose))
+    runs = Runs(period, command, pose, jnp.ones((1, len(log.t)), bool))
+    fit = fit_runs(runs, settings["d_max_share"] * sight.largest, law)
+    covariance = difference_covariance(to_vector(fit.robot, law), fit.covariance, period, law)
+    estimate = difference_vector(to_difference(fit.robot.drive, period), fit.robot.dead_zone)
+    return Finding(estimate, jnp.sqrt(jnp.diagonal(covariance)), jnp.where(fit.ok, FOUND, NOT_ARRIVED))
+
+
 def _start(sight: Sight, settings: dict[str, Any], count: int, forgetting: float):
     """The recursion at the end of the setup time, the setup itself, and the variance (2,) of its residuals."""
     count = min(count, len(sight.log.t))
@@ -183,11 +201,13 @@ _PAPER = {
     "reading": Setting("one_step", lambda value: value in NAMES, f"one of {', '.join(NAMES)}"),
     "d_max_share": Setting(D_MAX_SHARE, _number(0.0, 0.999), "a number above 0 and below 1"),
 }
+_LIKELIHOOD = {"d_max_share": _PAPER["d_max_share"]}
 METHODS = {
     "batch": Method(batch, _PAPER),
     "recursive": Method(
         recursively,
         _PAPER | {"forgetting": Setting(1.0, _number(0.0, 1.0), "a number above 0 and at most 1")},
     ),
+    "maximum-likelihood": Method(likelihood, _LIKELIHOOD),
 }
 """Every estimator by name."""

@@ -1,0 +1,31 @@
+"""The estimators of a study, side by side on the same logs."""
+
+import numpy as np
+from support.studies import SMALL
+
+from jaxident.robot.drive import Physical
+from jaxident.robot.model import Model
+from jaxident.study.dataset import study_arrays
+from jaxident.study.design import Candidate
+from jaxident.study.estimators import FOUND, METHODS, Choice
+from jaxident.study.statistics import summarise
+
+DRIVE = Physical(np.array([0.541386, 7.817043]), np.array([[0.128988, 0.127287], [66.824208, -65.25288]]))
+DIAGONAL = Model(1.0 / 30.0, DRIVE, np.array([0.25, 0.2]))
+
+
+def test_likelihood_knows_of_the_camera_and_the_papers_method_does_not():
+    study = SMALL._replace(
+        robots=(Candidate("diagonal", DIAGONAL, (0.0, 0.0, 0.0, 0.0)),),
+        estimators=tuple(Choice(name, name) for name in METHODS),
+        excitations=("multilevel",),
+        noise=(1e-3,),
+        samples=(300,),
+        hold=10,
+    )
+    trials = study_arrays(study)
+    assert np.all(trials["reason"] == FOUND)
+    rmse = summarise(trials)["rmse"].squeeze().sel(parameter="alpha_1")
+    assert rmse.sel(estimator="maximum-likelihood") < 0.01
+    for name in ("batch", "recursive"):
+        assert rmse.sel(estimator=name) > 0.3  # the printed reading shrinks the pole towards zero
