@@ -28,13 +28,13 @@ PATIENCE = "20s"
 def connected(scheduler: str) -> Iterator[Any]:
     """A Dask client: of a scheduler's address, or of `local:N`, N processes of one thread each on this machine, bound
     to its loopback. InputError where Dask is missing, the text is neither, or nobody answers."""
+    local = re.fullmatch(r"local:([1-9]\d*)", scheduler)
+    if scheduler.startswith("local") and not local:
+        raise InputError(f"--scheduler {scheduler}: local:N with N processes from 1 on, as local:2")
     try:
         import distributed
     except ImportError:
         raise InputError("--scheduler needs Dask: install jaxident with the extra `cluster`") from None
-    local = re.fullmatch(r"local:([1-9]\d*)", scheduler)
-    if scheduler.startswith("local") and not local:
-        raise InputError(f"--scheduler {scheduler}: local:N with N processes from 1 on, as local:2")
     with contextlib.ExitStack() as stack:
         if local:
             settings = distributed.LocalCluster(

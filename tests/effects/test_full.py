@@ -72,6 +72,7 @@ def test_heading_is_untouched_by_along_effects_without_coupling():
         assert np.max(np.abs(moved[:, :2] - base[:, :2])) > 1e-4
 
 
+@pytest.mark.slow
 def test_all_pairs_compose_in_one_program():
     key = jax.random.key(0)
     full(jnp.asarray(NEUTRAL), SHORT, key)

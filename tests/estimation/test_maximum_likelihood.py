@@ -107,6 +107,7 @@ def test_intervals_cover_under_the_law_that_made_the_data(noise):
     assert 0.92 < np.mean(np.abs(over_own[ok, :8]) < 1.96) < 0.98
 
 
+@pytest.mark.slow
 def test_several_uneven_runs_with_gaps_are_one_fit():
     noise = Noise(1e-4, 1e-3)
     first, second = logged(1, noise, 260, 0.3), logged(2, noise, 300, 0.3)
