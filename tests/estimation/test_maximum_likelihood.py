@@ -137,8 +137,9 @@ def test_batch_is_the_loop_and_compiles_once():
 
 
 def test_coloured_residuals_are_suspected():
+    """The line between white and coloured is passed by white residuals once in a hundred: in 10 logs hardly twice."""
     assert "coloured" in identify(logged(4, Noise(1e-3, 1e-2, 0.3))).suspicions[0]
-    assert identify(logged(4, Noise(1e-3, 1e-2))).suspicions == ()
+    assert sum(bool(identify(logged(seed, Noise(1e-3, 1e-2))).suspicions) for seed in range(10)) <= 1
 
 
 @pytest.mark.slow
