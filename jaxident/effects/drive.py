@@ -66,6 +66,17 @@ def dry_friction(before: Wheels, free: Wheels, mobility: Mobility, level) -> Whe
     return Wheels(*(jnp.where(stuck, a, b) for a, b in zip(both_stop, alone, strict=True)))
 
 
+def slide(before: Wheels, free: Wheels, mobility: Mobility, level) -> Wheels:
+    """`dry_friction` by one sweep over wheels that know each other's friction only roughly, for searches: right where
+    both slide, of first order in the step where one stops."""
+    (m_rr, m_rl), (m_lr, m_ll) = mobility
+    now, at_rest = level(before), level(Wheels(jnp.zeros_like(before.right), jnp.zeros_like(before.left)))
+    left = _one_wheel(before.left, free.left, m_ll, now.left, at_rest.left)
+    right = _one_wheel(before.right, free.right - m_rl * left, m_rr, now.right, at_rest.right)
+    left = _one_wheel(before.left, free.left - m_lr * right, m_ll, now.left, at_rest.left)
+    return Wheels(right, left)
+
+
 def _one_wheel(before: Array, free: Array, mobility: Array, level: Array, level_at_rest: Array) -> Array:
     """Mean friction of one wheel; speeds taken as linear in time between its events."""
     drive = safe_divide(free - before, mobility, 0.0)

@@ -1,0 +1,108 @@
+"""The poses of all windows linearised: residuals and their differences, whitened, start states projected out.
+
+Everything after this is linear algebra on Gram matrices: steps of the search, scores, replays. Derivatives are forward
+differences of the one compiled program that follows windows: they serve effects with corners as well, where a
+derivative would say nothing, and compile in a fraction of the time.
+"""
+
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from jaxident.array_types import Array
+from jaxident.diagnosis.coordinates import SIZE, limits, sizes
+from jaxident.diagnosis.paths import residuals
+from jaxident.diagnosis.responses import answer_to_start
+from jaxident.diagnosis.windows import Windows
+
+START_STATES = 5
+LANES = 8
+"""Vectors that the compiled program follows at once: few enough for the cache, one shape for every question."""
+PART = 1e-5
+"""Of a coordinate's size: the step of a difference."""
+
+
+class Linear(NamedTuple):
+    """Residuals (windows, numbers), derivatives of the modelled poses by coordinates (windows, numbers, columns) and by
+    the own start state (windows, numbers, 5); numbers are rows times x, y, heading."""
+
+    residual: Any
+    slopes: Any
+    starts: Any
+
+
+class Gram(NamedTuple):
+    """Products per window of whitened columns free of start states (windows, n, n), the residual last, and what start
+    states take of each column (windows, 5, n)."""
+
+    products: Any
+    solve: Any
+
+
+_followed = jax.jit(jax.vmap(residuals, in_axes=(0, 0, None)))
+
+
+def follow(vectors: Array, starts: Array, windows: Windows) -> np.ndarray:
+    """Residuals (batch, windows, numbers) at vectors (batch, SIZE) and starts (batch, 5, windows)."""
+    count = len(vectors)
+    short = -count % LANES
+    vectors = np.concatenate([vectors, np.repeat(vectors[-1:], short, axis=0)])
+    starts = np.concatenate([starts, np.repeat(starts[-1:], short, axis=0)])
+    found = [
+        np.asarray(_followed(vectors[k : k + LANES], starts[k : k + LANES], windows))
+        for k in range(0, len(vectors), LANES)
+    ]
+    whole = np.concatenate(found)[:count]
+    return whole.transpose(0, 2, 1, 3).reshape(count, whole.shape[2], -1)
+
+
+def linearise(vector: Array, starts: Array, windows: Windows, places: list[int]) -> Linear:
+    """At a vector (SIZE,) and starts (5, windows), by the coordinates at some places of the vector.
+
+    Start states answer in closed form, as those of the nominal robot do: they are eliminated, not reported.
+    """
+    step = PART * sizes()
+    _, high = limits()
+    step = np.where(vector + step > high, -step, step)[places]
+    columns = len(places)
+    vectors = np.tile(vector, (1 + columns, 1))
+    vectors[1 + np.arange(columns), places] += step
+    found = follow(vectors, np.broadcast_to(starts, (len(vectors), *starts.shape)), windows)
+    change = np.moveaxis(found[:1] - found[1:], 0, -1)
+    return Linear(found[0], change / step, answer_to_start(np.exp(vector[:2]), found[0], windows))
+
+
+def gram(whitener: Array, columns: Array, starts: Array) -> Gram:
+    """Products of columns (windows, numbers, n) after a whitener (windows, numbers, numbers)."""
+    columns, starts = whitener @ columns, whitener @ starts
+    scale = np.sqrt(np.sum(starts**2, axis=1, keepdims=True)) + 1e-300
+    basis, upper = np.linalg.qr(starts / scale)
+    upper = upper + 1e-9 * np.eye(START_STATES)
+    taken = basis.transpose(0, 2, 1) @ columns
+    rest = columns - basis @ taken
+    return Gram(rest.transpose(0, 2, 1) @ rest, np.linalg.solve(upper, taken) / scale.transpose(0, 2, 1))
+
+
+def explained(products: Array, base: list[int], more: list[int]) -> float:
+    """Fall of -log p when columns `more` join columns `base` in the fit of the last one; products (n, n)."""
+    return _left(products, base) - _left(products, [*base, *more])
+
+
+def _left(products: Array, columns: list[int]) -> float:
+    """Half the squares that a fit of the last column by some others leaves."""
+    last = len(products) - 1
+    if not columns:
+        return 0.5 * float(products[last, last])
+    own, cross, scale = normal(products, columns)
+    return 0.5 * float(products[last, last] - cross @ np.linalg.solve(own, cross))
+
+
+def normal(products: Array, columns: list[int], ridge: float = 1e-10) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Normal equations for some columns in units of their length: matrix, right side, lengths."""
+    own = products[np.ix_(columns, columns)]
+    scale = np.sqrt(np.maximum(np.diagonal(own), 1e-300))
+    return own / scale[:, None] / scale + ridge * np.eye(len(columns)), products[columns, -1] / scale, scale
+
+
+__all__ = ["SIZE", "Gram", "Linear", "explained", "follow", "gram", "linearise", "normal"]

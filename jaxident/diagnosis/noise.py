@@ -1,0 +1,187 @@
+"""What is random: the camera's error, white or with a memory, and slip of the wheels, sized from the residuals.
+
+Restricted likelihood (Patterson and Thompson 1971, Biometrika 58): every window's start state is eliminated, so that
+what it takes up of the residuals is not lost from the noise. The covariance is linear in the variances, which are
+searched by average information (Gilmour, Thompson and Cullis 1995, Biometrics 51). NumPy, windows first.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jaxident.array_types import Array
+from jaxident.diagnosis.responses import Responses
+from jaxident.diagnosis.windows import Windows
+
+MOST_STEPS = 12
+SAMPLE, ROWS = 60, 20
+"""Windows from which noise is sized, spread evenly, and rows of each: slip is slow, and few rows show it."""
+SLIP_TIMES = (0.05, 0.2, 0.8)
+CAMERA_TIMES = (0.1, 0.5)
+WORTH = 6.0
+"""Gain of log-likelihood for which a term is believed: two variances and a correlation time."""
+
+
+class Law(NamedTuple):
+    """Standard deviations: white camera error [m], [rad]; slip as an acceleration [m/s^2], [rad/s^2] of correlation
+    time [s], None without; camera error with a memory, None without."""
+
+    position: float
+    heading: float
+    slip: tuple[float, float] | None = None
+    slip_time: float | None = None
+    coloured: tuple[float, float] | None = None
+    coloured_time: float | None = None
+
+
+class Sized(NamedTuple):
+    """A law and the restricted log-likelihood of the windows it was sized on."""
+
+    law: Law
+    log_likelihood: float
+
+
+def first_law(windows: Windows) -> Law:
+    """Camera error by fourth differences of the poses, which motion hardly enters; the median forgives switches."""
+    pose, seen = np.asarray(windows.pose), np.asarray(windows.seen)
+    whole = np.all([seen[k : len(seen) - 4 + k] for k in range(5)], axis=0)
+    found = []
+    for k in range(3):
+        column = np.unwrap(pose[..., k], axis=0) if k == 2 else pose[..., k]
+        change = np.diff(column, n=4, axis=0)[whole]
+        found.append(float(np.median(np.abs(change))) / 0.6745 / np.sqrt(70.0) if change.size else 1e-3)
+    return Law(max(np.hypot(*found[:2]) / np.sqrt(2.0), 1e-7), max(found[2], 1e-7))
+
+
+def covariance(law: Law, windows: Windows, responses: Responses) -> np.ndarray:
+    """Covariance (windows, numbers, numbers) of the poses; unseen ones stand alone with variance 1."""
+    parts = _parts(law.slip_time, law.coloured_time, windows, responses)
+    variances = [law.position, law.heading, *(law.slip or ()), *(law.coloured or ())]
+    total = sum(sd**2 * part for sd, part in zip(variances, parts, strict=True))
+    return total + _alone(windows)
+
+
+def whitener_of(law: Law, windows: Windows, responses: Responses) -> np.ndarray:
+    """The inverse Cholesky factor (windows, numbers, numbers) of the covariance; rows of unseen poses are zero."""
+    factor = np.linalg.inv(np.linalg.cholesky(covariance(law, windows, responses)))
+    return factor * _numbers_seen(windows)[:, :, None]
+
+
+def size_noise(residual: Array, starts: Array, windows: Windows, responses: Responses, use: Array) -> Law:
+    """The likeliest law: white, with slip, with a camera memory, each only where it is worth its terms; from residuals
+    (windows, numbers) and derivatives by start states (windows, numbers, 5) of the windows in `use` (boolean)."""
+    chosen = np.flatnonzero(use)
+    chosen = chosen[np.unique(np.linspace(0, len(chosen) - 1, min(SAMPLE, len(chosen))).round().astype(int))]
+    own = take(windows, chosen)
+    part = Responses(*(leaf[chosen] for leaf in responses))
+    every = np.arange(0, len(own.seen), max(1, len(own.seen) // ROWS))
+    numbers = (3 * every[:, None] + np.arange(3)).ravel()
+    given = residual[chosen][:, numbers], starts[chosen][:, numbers], own, part, numbers
+    best = _size(given, first_law(windows), None, None)
+    slip = max((_size(given, best.law, time, None) for time in SLIP_TIMES), key=lambda s: s.log_likelihood)
+    memory = max((_size(given, best.law, None, time) for time in CAMERA_TIMES), key=lambda s: s.log_likelihood)
+    first = max((slip, memory), key=lambda s: s.log_likelihood)
+    if first.log_likelihood < best.log_likelihood + WORTH:
+        return best.law
+    slip_time, memory_time = slip.law.slip_time, memory.law.coloured_time
+    both = _size(given, best.law, slip_time, memory_time)
+    return both.law if both.log_likelihood > first.log_likelihood + WORTH else first.law
+
+
+def take(windows: Windows, chosen: Array) -> Windows:
+    """Some of the windows; the runs stay whole."""
+    return windows._replace(
+        step=windows.step[:, chosen], pose=windows.pose[:, chosen], seen=windows.seen[:, chosen],
+        run=windows.run[chosen], first=windows.first[chosen],
+    )  # fmt: skip
+
+
+def _size(given, begin: Law, slip_time: float | None, coloured_time: float | None) -> Sized:
+    """The best variances of one structure."""
+    residual, starts, windows, responses, numbers = given
+    parts = _parts(slip_time, coloured_time, windows, responses, numbers)
+    size = [begin.position**2, begin.heading**2]
+    for part in parts[2:]:  # a hundredth of the camera's variance at the poses
+        size.append(0.01 * begin.position**2 / max(float(np.mean(np.diagonal(part, axis1=1, axis2=2))), 1e-300))
+    theta, value = _search(residual, starts, parts, np.array(size), _alone(windows, numbers))
+    sd = np.sqrt(theta)
+    slip = (float(sd[2]), float(sd[3])) if slip_time is not None else None
+    coloured = (float(sd[-2]), float(sd[-1])) if coloured_time is not None else None
+    return Sized(Law(float(sd[0]), float(sd[1]), slip, slip_time, coloured, coloured_time), value)
+
+
+def _parts(slip_time, coloured_time, windows: Windows, responses: Responses, numbers=slice(None)) -> list[np.ndarray]:
+    """What each variance multiplies, for some of the numbers."""
+    seen = _numbers_seen(windows)
+    channel, rows = (np.arange(seen.shape[1]) % 3)[numbers], (np.arange(seen.shape[1]) // 3)[numbers]
+    seen = seen[:, numbers]
+    both = seen[:, :, None] * seen[:, None, :]
+    camera = [np.eye(len(channel)) * wanted for wanted in (channel < 2, channel == 2)]
+    parts = [both * part for part in camera]
+    step = np.asarray(windows.step).T
+    time = np.cumsum(step, axis=1) - step
+    apart = np.abs(time[:, :, None] - time[:, None, :])
+    if slip_time is not None:
+        memory = np.exp(-apart / slip_time)
+        parts += [
+            both * (g @ memory @ g.transpose(0, 2, 1))
+            for g in (responses.along[:, numbers], responses.heading[:, numbers])
+        ]
+    if coloured_time is not None:
+        memory = np.exp(-apart / coloured_time)[:, rows][:, :, rows]
+        same = channel[:, None] == channel
+        parts += [both * memory * (same & (channel < 2)), both * memory * (same & (channel == 2))]
+    return parts
+
+
+def _numbers_seen(windows: Windows) -> np.ndarray:
+    """1 or 0 (windows, numbers)."""
+    return np.repeat(np.asarray(windows.seen).T, 3, axis=1).astype(float)
+
+
+def _alone(windows: Windows, numbers=slice(None)) -> np.ndarray:
+    """Variance 1 for numbers that were not seen."""
+    unseen = 1.0 - _numbers_seen(windows)[:, numbers]
+    return unseen[:, :, None] * np.eye(unseen.shape[1])
+
+
+def _search(residual: Array, starts: Array, parts, theta: Array, alone: Array) -> tuple[np.ndarray, float]:
+    """Variances of the highest restricted likelihood, and that likelihood."""
+    damping, best, value, slope, curve = 1e-3, theta, -np.inf, None, None
+    proposed = theta
+    for _ in range(MOST_STEPS):
+        found = _likelihood(residual, starts, parts, proposed, alone)
+        gained = found[0] - value
+        if gained >= 0.0 or slope is None:
+            best, (value, slope, curve), damping = proposed, found, 0.3 * damping
+            if 0.0 <= gained < 0.02:
+                break
+        else:
+            damping *= 10.0
+        # in logarithms of the variances
+        gradient, matrix = best * slope, best[:, None] * curve * best
+        matrix = matrix + (damping + 1e-9) * np.diag(np.diagonal(matrix) + 1e-3)
+        proposed = best * np.exp(np.clip(np.linalg.solve(matrix, gradient), -3.0, 2.0))
+    return best, float(value)
+
+
+def _likelihood(residual: Array, starts: Array, parts, theta: Array, alone: Array):
+    """Restricted log-likelihood, its gradient and average information in the variances."""
+    total = sum(t * part for t, part in zip(theta, parts, strict=True)) + alone
+    factor = np.linalg.cholesky(total)
+    inverse = np.linalg.inv(factor)
+    inverse = inverse.transpose(0, 2, 1) @ inverse
+    weighted = inverse @ starts
+    information = starts.transpose(0, 2, 1) @ weighted
+    scale = np.sqrt(np.diagonal(information, axis1=1, axis2=2))[:, :, None]
+    information = information / scale / scale.transpose(0, 2, 1) + 1e-12 * np.eye(5)
+    weighted = weighted / scale.transpose(0, 2, 1)
+    inverse = inverse - weighted @ np.linalg.solve(information, weighted.transpose(0, 2, 1))
+    taken = (inverse @ residual[..., None])[..., 0]
+    moved = np.stack([(part @ taken[..., None])[..., 0] for part in parts])
+    back = (inverse @ moved[..., None])[..., 0]
+    slope = np.array([0.5 * (np.sum(m * taken) - np.sum(inverse * part)) for m, part in zip(moved, parts, strict=True)])
+    curve = 0.5 * np.einsum("iwa,jwa->ij", moved, back)
+    determinant = 2.0 * np.sum(np.log(np.diagonal(factor, axis1=1, axis2=2)))
+    determinant += np.sum(np.linalg.slogdet(information)[1]) + 2.0 * np.sum(np.log(scale))
+    return -0.5 * (determinant + np.sum(residual * taken)), slope, curve

@@ -1,0 +1,173 @@
+"""From logs to what a diagnosis works on: scaled commands, windows, what each run is for, and frames that lie."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxident.array_types import Array
+from jaxident.diagnosis.coordinates import neutral_vector, nominal_vector
+from jaxident.diagnosis.linear import START_STATES
+from jaxident.diagnosis.noise import Law, first_law, size_noise
+from jaxident.diagnosis.responses import respond
+from jaxident.diagnosis.search import Data, Solution, refit
+from jaxident.diagnosis.windows import Windows, cut
+from jaxident.errors import InputError
+from jaxident.estimation.checks import check_informative
+from jaxident.estimation.maximum_likelihood import begin
+from jaxident.estimation.runs import stack_runs
+from jaxident.log import Log, join
+from jaxident.robot.drive import Physical
+
+BURN = 20
+"""Rows from which a window's start state is estimated before the horizon begins."""
+LONGEST, SHORTEST = 60, 20
+"""Rows of a horizon where none is asked for: cost grows with their cube, sensitivity with their number."""
+HORIZON = 1.0
+"""Horizon [s] where none is asked for."""
+OUTLYING = 7.0
+"""Standard deviations by which a pose leaves both its neighbours before it is an outlier."""
+
+
+class Frames(NamedTuple):
+    """Poses that are no measurement of their time, boolean (rows of the log,): exact repeats, and outliers."""
+
+    frozen: Any
+    outlying: Any
+
+
+class Prepared(NamedTuple):
+    """The log with commands over `largest`; windows; which of them name, boolean (windows,), the others only judge the
+    gap; horizon [s] and its rows; the nominal fit and noise law from the windows that name."""
+
+    log: Log
+    largest: float
+    windows: Windows
+    naming: Any
+    horizon: float
+    frames: Frames
+    nominal: Solution
+    law: Law
+
+
+def prepare(logs, horizon: float | None, nominal: Array | None = None) -> Prepared:
+    """Windows, roles and the nominal fit; `nominal` (10,) is where its search begins, from the data alone without.
+
+    InputError where the log says nothing: no motion, no excitation, too few poses.
+    """
+    log = join(logs)
+    check_informative(log)
+    largest = float(np.nanmax(np.abs(np.stack(log.command))))
+    log = log._replace(u_r=np.asarray(log.u_r) / largest, u_l=np.asarray(log.u_l) / largest)
+    frozen = find_repeats(log)
+    log = blind(log, frozen)
+    period = float(np.median(np.concatenate([np.diff(run.t) for run in log.runs()])))
+    rows, horizon = horizon_rows(horizon, period)
+    windows = cut(log, BURN + rows)
+    if windows.step.shape[1] < 2:
+        raise InputError(f"{len(log.t)} rows: too few for windows of {BURN + rows} rows; record longer runs")
+    vector = neutral_vector(starting_point(log) if nominal is None else nominal)
+    naming = roles(windows)
+    first = rough_fit(windows, naming, vector)
+    outlying = find_outliers(log, windows, first)
+    if outlying.any():
+        windows = cut(blind(log, outlying), BURN + rows)
+        naming = roles(windows)
+        first = rough_fit(windows, naming, first.vector)
+    responses = respond(np.exp(first.vector[:2]), first.linear.residual, windows)
+    law = size_noise(first.linear.residual, first.linear.starts, windows, responses, naming)
+    return Prepared(log, largest, windows, naming, horizon, Frames(frozen, outlying), first, law)
+
+
+def horizon_rows(horizon: float | None, period: float) -> tuple[int, float]:
+    """Rows of a horizon [s], and the horizon that they make."""
+    if horizon is None:
+        rows = int(np.clip(round(HORIZON / period), SHORTEST, LONGEST))
+    else:
+        rows = round(horizon / period)
+        if not 1 <= rows <= 4 * LONGEST:
+            raise InputError(
+                f"horizon: {horizon:g} s is {rows} samples of this log; it may be {period:g} to {4 * LONGEST * period:g} s"
+            )
+    return rows, rows * period
+
+
+def starting_point(log: Log) -> np.ndarray:
+    """The nominal coordinates (10,) that the starter of the likelihood finds."""
+    runs = jax.tree.map(jnp.asarray, stack_runs(log))
+    found = begin(runs, jnp.asarray(0.9)).estimate
+    drive = Physical(np.asarray(found.rate), np.asarray(found.gain))
+    point = nominal_vector(drive, np.asarray(found.dead_zone))
+    if not np.all(np.isfinite(point)) or abs(np.linalg.det(np.asarray(found.gain))) < 1e-9:
+        raise InputError("the log does not determine a nominal model: drive both wheels, at several levels")
+    return point
+
+
+def rough_fit(windows: Windows, naming: Array, vector: Array) -> Solution:
+    """The nominal fit for white camera noise as fourth differences size it."""
+    law = first_law(windows)
+    seen = np.repeat(np.asarray(windows.seen).T, 3, axis=1)
+    scale = np.tile(1.0 / np.array([law.position, law.position, law.heading]), len(windows.step))
+    white = np.eye(len(scale)) * scale * seen[:, :, None]
+    return refit(Data(windows, white, naming), vector, first_starts(windows), (), most=6)
+
+
+def first_starts(windows: Windows) -> np.ndarray:
+    """Start states (5, windows) from the first poses seen in each window."""
+    pose, seen = np.asarray(windows.pose), np.asarray(windows.seen)
+    starts = np.zeros((START_STATES, pose.shape[1]))
+    time = np.cumsum(windows.step, axis=0) - windows.step
+    for window in range(pose.shape[1]):
+        rows = np.flatnonzero(seen[:, window])[:8]
+        x, y, theta = pose[rows, window].T
+        theta = np.unwrap(theta)
+        passed = time[rows[-1], window] - time[rows[0], window]
+        middle = theta[len(rows) // 2]
+        v = ((x[-1] - x[0]) * np.cos(middle) + (y[-1] - y[0]) * np.sin(middle)) / passed
+        w = (theta[-1] - theta[0]) / passed
+        starts[:, window] = x[0], y[0], theta[0], v, w
+    return starts
+
+
+def roles(windows: Windows) -> np.ndarray:
+    """Windows that name, boolean (windows,); the others, every third run from the second on, are used for the gap alone.
+
+    Of one or two runs it is stretches of four windows, so that both purposes see early and late.
+    """
+    if len(np.unique(windows.run)) >= 3:
+        return windows.run % 3 != 1
+    order = np.arange(len(windows.run))
+    return (order // 2) % 3 != 1
+
+
+def find_repeats(log: Log) -> np.ndarray:
+    """Rows whose pose equals the one before in all three numbers: a camera with noise never measures that."""
+    pose = np.stack([log.x, log.y, log.theta])
+    same = np.concatenate([[False], np.all(pose[:, 1:] == pose[:, :-1], axis=0)])
+    same &= np.concatenate([[False], np.asarray(log.run)[1:] == np.asarray(log.run)[:-1]])
+    noisy = np.mean(same) < 0.3
+    return same & noisy
+
+
+def blind(log: Log, rows: Array) -> Log:
+    """The log without the poses of some rows."""
+    x, y, theta = (np.where(rows, np.nan, column) for column in log.pose)
+    return log._replace(x=x, y=y, theta=theta)
+
+
+def find_outliers(log: Log, windows: Windows, solution: Solution) -> np.ndarray:
+    """Rows (of the log) whose residual leaves those of both neighbours, which agree with each other."""
+    residual = solution.linear.residual.reshape(*np.asarray(windows.step).T.shape, 3)
+    seen = np.asarray(windows.seen).T
+    middle = residual[:, 1:-1] - 0.5 * (residual[:, 2:] + residual[:, :-2])
+    whole = seen[:, 1:-1] & seen[:, 2:] & seen[:, :-2]
+    apart = np.abs(residual[:, 2:] - residual[:, :-2])
+    spread = np.array([np.median(np.abs(middle[..., k][whole])) / 0.6745 if whole.any() else 1.0 for k in range(3)])
+    lonely = (np.abs(middle) > OUTLYING * spread) & (apart < 0.5 * np.abs(middle))
+    hit = lonely.any(axis=2) & whole
+    found = np.zeros(len(log.t), bool)
+    begins = np.flatnonzero(np.concatenate([[True], np.asarray(log.run)[1:] != np.asarray(log.run)[:-1]]))
+    for window, row in zip(*np.nonzero(hit), strict=True):
+        found[begins[windows.run[window]] + windows.first[window] + row + 1] = True
+    return found

@@ -1,0 +1,120 @@
+"""The best fit of the nominal robot with some effects, start states free: Levenberg-Marquardt on whitened windows."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jaxident.array_types import Array
+from jaxident.diagnosis.coordinates import PLACES, free_places, limits
+from jaxident.diagnosis.linear import Linear, follow, gram, linearise, normal
+from jaxident.diagnosis.windows import Windows
+
+MOST_STEPS = 12
+ENOUGH = 0.05
+"""Promised fall of -log p below which the search ends."""
+LONGEST = 0.5
+"""A step changes a rate by at most this much, as a logarithm."""
+
+
+class Data(NamedTuple):
+    """Windows, the whitener of their noise (windows, numbers, numbers), and which of them (boolean) a fit uses."""
+
+    windows: Windows
+    whitener: Any
+    use: Any
+
+
+class Solution(NamedTuple):
+    """A fit: vector (SIZE,), starts (5, windows), the linearisation there in `places`, half the squares over the windows
+    used, and the covariance of the free coordinates."""
+
+    vector: Any
+    starts: Any
+    places: list
+    linear: Linear
+    cost: float
+    covariance: Any
+    steps: int
+
+
+def refit(data: Data, vector: Array, starts: Array, effects: tuple[str, ...], hold: tuple = (), most=MOST_STEPS):
+    """The fit nearest downhill of a vector and starts with the coordinates of `effects` free, but those in `hold`."""
+    held = {PLACES[pair] for pair in hold}
+    places = [place for place in free_places(effects) if place not in held]
+    vector, starts = np.array(vector), np.array(starts)
+    low, high = (bound[places] for bound in limits())
+    linear = linearise(vector, starts, data.windows, places)
+    products, solve = _products(data, linear)
+    cost, damping = 0.5 * products[-1, -1] + _taken(data, linear), 1e-4
+    for step_number in range(1, most + 1):
+        step, promised = _step(products, vector[places], low, high, damping)
+        if promised < ENOUGH and step_number > 1:
+            break
+        new_vector = vector.copy()
+        new_vector[places] = np.clip(vector[places] + step, low, high)
+        step = new_vector[places] - vector[places]
+        moved = solve[:, :, -1] - solve[:, :, :-1] @ step
+        new_starts = starts + moved.T
+        new_cost = half_squares(data, new_vector, new_starts)
+        if new_cost < cost:
+            gained, damping = cost - new_cost, max(0.2 * damping, 1e-7)
+            vector, starts = new_vector, new_starts
+            linear = linearise(vector, starts, data.windows, places)
+            products, solve = _products(data, linear)
+            cost = new_cost
+            if gained < ENOUGH:
+                break
+        else:
+            damping *= 10.0
+            if damping > 1e6:
+                break
+    return Solution(vector, starts, places, linear, cost, _covariance(products), step_number)
+
+
+def half_squares(data: Data, vector: Array, starts: Array) -> float:
+    """-log p up to a constant of the windows used."""
+    residual = follow(vector[None], starts[None], data.windows)[0]
+    return 0.5 * float(np.sum((data.whitener[data.use] @ residual[data.use, :, None]) ** 2))
+
+
+def _taken(data: Data, linear: Linear) -> float:
+    """What start states would still take of the squares."""
+    residual = linear.residual[data.use]
+    whole = 0.5 * float(np.sum((data.whitener[data.use] @ residual[..., None]) ** 2))
+    rest = gram(data.whitener[data.use], residual[..., None], linear.starts[data.use])
+    return whole - 0.5 * float(np.sum(rest.products))
+
+
+def _products(data: Data, linear: Linear) -> tuple[np.ndarray, np.ndarray]:
+    """Summed products (n, n), the residual last, and what start states take in every window (windows, 5, n)."""
+    found = gram(data.whitener, np.concatenate([linear.slopes, linear.residual[..., None]], axis=2), linear.starts)
+    return found.products[data.use].sum(axis=0), found.solve
+
+
+def _step(products: Array, now: Array, low: Array, high: Array, damping: float) -> tuple[np.ndarray, float]:
+    """The damped step within the bounds, and the fall it promises; coordinates that a bound stops are held."""
+    free = list(range(len(now)))
+    step = np.zeros(len(now))
+    for _ in range(4):
+        if not free:
+            break
+        own, cross, scale = normal(products, free)
+        step[:] = 0.0
+        step[free] = np.linalg.solve(own + damping * np.eye(len(free)), cross) / scale
+        out = ((now <= low) & (step < 0.0)) | ((now >= high) & (step > 0.0))
+        if not out.any():
+            break
+        free = [k for k in free if not out[k]]
+    longest = np.max(np.abs(step[:2])) if len(step) > 1 else 0.0
+    if longest > LONGEST:
+        step = step * LONGEST / longest
+    step = np.clip(now + step, low, high) - now
+    return step, float(step @ products[:-1, -1] - 0.5 * step @ products[:-1, :-1] @ step)
+
+
+def _covariance(products: Array) -> np.ndarray:
+    """Covariance of the free coordinates; directions without information get a large finite variance."""
+    own, _, scale = normal(products, list(range(len(products) - 1)), ridge=0.0)
+    values, vectors = np.linalg.eigh(own)
+    rows = vectors / np.sqrt(np.maximum(values, 1e-12))
+    return rows @ rows.T / scale[:, None] / scale

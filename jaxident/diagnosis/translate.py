@@ -1,0 +1,110 @@
+"""Between the coordinates of a search, for commands over their largest, and models in the user's unit."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from jaxident.array_types import Array
+from jaxident.diagnosis.coordinates import (
+    COORDINATES,
+    NOMINAL,
+    PLACES,
+    SHAPES,
+    natural,
+    nominal_vector,
+    to_catalogue,
+    unit_factors,
+)
+from jaxident.diagnosis.noise import Law
+from jaxident.diagnosis.prepare import Prepared
+from jaxident.diagnosis.search import Solution
+from jaxident.errors import InputError
+from jaxident.log import Log, join
+from jaxident.robot.drive import Physical
+from jaxident.robot.model import Effect, Model, Provenance, require_physical
+from jaxident.robot.noise import Noise
+
+_POWERS = np.array([0, 0, -1, -1, -1, -1, 1, 1, 0, 0])
+"""How the nominal parameters scale with the unit of the command."""
+
+
+def to_coordinates(model: Model, logs: Log | Sequence[Log]) -> np.ndarray:
+    """The nominal coordinates (10,) of a model for the commands of some logs over their largest."""
+    if model.effects:
+        raise InputError(
+            f"effect {model.effects[0].name!r}: --model is a nominal model to judge; leave its effects out"
+        )
+    drive = require_physical(model)
+    largest = float(np.nanmax(np.abs(np.stack(join(logs).command))))
+    point = nominal_vector(drive, np.asarray(model.dead_zone))
+    return np.concatenate([point[:2], point[2:] / largest ** _POWERS[2:]])
+
+
+def given_parameters(model: Model) -> list[float]:
+    """The nominal parameters (10,) of a model in the order of NOMINAL."""
+    return natural(nominal_vector(require_physical(model), np.asarray(model.dead_zone))).tolist()
+
+
+def parameters_of(solution: Solution, largest: float) -> tuple[tuple[str, ...], list[float], list[float]]:
+    """Names, values and standard deviations of the nominal parameters in the user's unit."""
+    factor = float(largest) ** _POWERS
+    values = natural(solution.vector) * factor
+    slope = np.concatenate([np.exp(solution.vector[:2]), np.ones(8)]) * factor
+    deviation = np.sqrt(np.diagonal(solution.covariance)[:10]) * np.abs(slope)
+    return NOMINAL, values.tolist(), deviation.tolist()
+
+
+def effect_of(name: str, solution: Solution, largest: float) -> Effect:
+    """One effect of a solution with standard deviations, in the user's unit; deviations to first order."""
+    coordinates = [c.name for c in COORDINATES[name]]
+    here = {key: solution.vector[PLACES[name, key]] for key in coordinates}
+    factors = unit_factors(name, largest)
+    values = {key: v * factors[key] for key, v in to_catalogue(name, here).items()}
+    places = [solution.places.index(PLACES[name, key]) for key in coordinates if PLACES[name, key] in solution.places]
+    own = solution.covariance[np.ix_(places, places)]
+    slopes = []
+    for place in places:
+        key = next(k for k in coordinates if PLACES[name, k] == solution.places[place])
+        step = 1e-6 * max(abs(here[key]), 1e-3)
+        moved = to_catalogue(name, {**here, key: here[key] + step})
+        slopes.append([(moved[k] * factors[k] - values[k]) / step for k in values])
+    slope = np.array(slopes)
+    spread = np.sqrt(np.maximum(np.einsum("ap,ab,bp->p", slope, own, slope), 0.0))
+    return Effect(name, values, dict(zip(values, spread.tolist(), strict=True)))
+
+
+def to_model(
+    prepared: Prepared, solution: Solution, law: Law, effects: tuple[str, ...], direct: dict[str, dict] | None = None
+) -> Model:
+    """A solution as a model with its noise law and effects, `direct` ones by their parameters."""
+    _, values, deviations = parameters_of(solution, prepared.largest)
+    steps = np.concatenate([np.diff(run.t) for run in prepared.log.runs()])
+    found = [effect_of(name, solution, prepared.largest) for name in effects]
+    found += [Effect(name, dict(parameters)) for name, parameters in (direct or {}).items()]
+    coupling: Any = np.array(values[8:10])
+    return Model(
+        float(np.median(steps)),
+        Physical(np.array(values[:2]), np.array(values[2:6]).reshape(2, 2), coupling),
+        np.array(values[6:8]),
+        noise=noise_of(law),
+        effects=tuple(found),
+        provenance=Provenance(method="diagnosis"),
+    )
+
+
+def noise_of(law: Law) -> Noise:
+    """A law as a model's noise: slip as a white acceleration of equal power at low frequency."""
+    slip = law.slip or (0.0, 0.0)
+    density = float(np.sqrt(2.0 * law.slip_time)) if law.slip_time else 0.0
+    return Noise(law.position, law.heading, None, slip[0] * density, slip[1] * density)
+
+
+def is_shape(name: str, key: str) -> bool:
+    """Whether a coordinate only shapes its effect."""
+    return (name, key) in SHAPES
+
+
+def scaled(point: Array, largest: float) -> np.ndarray:
+    """Nominal coordinates for commands over `largest` as those in the user's unit."""
+    return np.concatenate([point[:2], point[2:10] * float(largest) ** _POWERS[2:]])

@@ -1,0 +1,111 @@
+"""From evidence to probabilities, and from those to a verdict."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxident.diagnosis.which import ENOUGH, Finding
+from jaxident.effects.catalogue import CATALOGUE, SITES
+
+TEMPERATURE = 2.0
+"""Differences of evidence count for half: the noise law and the forms of the effects are never quite right."""
+UNEXPLAINED, SIGNIFICANT = 0.2, 20.0
+"""A gap is unknown where the corrector explains this share of it beyond the best set, and that much of -log p."""
+SHARPNESS = 0.04, 4.0
+"""Width of both thresholds: how slowly probability passes from known to unknown."""
+ALIKE = 6.0
+"""Effects whose evidence in place of another falls short of its by less than this cannot be told from it."""
+
+
+class Cause(NamedTuple):
+    """One effect: the probability that it takes part, and effects that this input cannot tell from it."""
+
+    effect: str
+    site: str
+    probability: float
+    indistinguishable_from: tuple[str, ...]
+    extension: bool
+
+
+class Judgement(NamedTuple):
+    """Probabilities of no gap, of an unknown one, and of sets of effects; causes, most probable first; of each site."""
+
+    none: float
+    unknown: float
+    sets: list[tuple[tuple[str, ...], float]]
+    causes: list[Cause]
+    sites: dict[str, float]
+
+
+def judge(finding: Finding, extra: dict[str, float]) -> Judgement:
+    """Probabilities from the candidates, from what the corrector still explains, and from effects found directly in the
+    frames or in the noise law (`extra`: name to evidence)."""
+    sure = tuple(name for name, evidence in extra.items() if evidence > ENOUGH)
+    weights = {effects: (c.evidence - ENOUGH * len(effects)) / TEMPERATURE for effects, c in finding.candidates.items()}
+    top = max(weights.values())
+    total = sum(np.exp(value - top) for value in weights.values())
+    chance = {effects: float(np.exp(value - top) / total) for effects, value in weights.items()}
+    unknown = unknown_probability(finding)
+    known = 1.0 - unknown
+    sets: dict[tuple[str, ...], float] = {}
+    for effects, p in chance.items():
+        key = tuple(sorted((*effects, *sure)))
+        sets[key] = sets.get(key, 0.0) + known * p
+    none = sets.pop((), 0.0)
+    ordered = sorted(((key, p) for key, p in sets.items() if p > 1e-4), key=lambda pair: -pair[1])
+    spare = 1.0 - none - unknown - sum(p for _, p in ordered)
+    ordered = [(key, p + spare if k == 0 else p) for k, (key, p) in enumerate(ordered)]
+    none = none if ordered else 1.0 - unknown
+    return Judgement(none, unknown, ordered, _causes(finding, ordered), _sites(finding, ordered, unknown))
+
+
+def unknown_probability(finding: Finding) -> float:
+    """How sure the corrector makes that something outside the selected set takes part."""
+    rest = sum(gain for _, gain in finding.terms)
+    gained = finding.candidates[finding.selected].gain
+    share = rest / max(gained + rest, 1e-9)
+    large = _logistic((rest - SIGNIFICANT) / SHARPNESS[1])
+    return large * _logistic((share - UNEXPLAINED) / SHARPNESS[0])
+
+
+def _logistic(value: float) -> float:
+    return float(1.0 / (1.0 + np.exp(-np.clip(value, -60.0, 60.0))))
+
+
+def _causes(finding: Finding, sets) -> list[Cause]:
+    taking: dict[str, float] = {}
+    for effects, p in sets:
+        for name in effects:
+            taking[name] = taking.get(name, 0.0) + p
+    order = sorted(taking, key=lambda name: (name not in finding.selected, -taking[name]))
+    return [
+        Cause(name, CATALOGUE[name].site, min(taking[name], 1.0), alike(finding, name), CATALOGUE[name].extension)
+        for name in order if taking[name] > 1e-3
+    ]  # fmt: skip
+
+
+def alike(finding: Finding, name: str) -> tuple[str, ...]:
+    """Effects that stand in place of one in a set whose evidence is nearly as good."""
+    others = []
+    for effects, candidate in finding.candidates.items():
+        if name not in effects:
+            continue
+        rest = set(effects) - {name}
+        if effects != finding.selected and name in finding.selected:
+            continue
+        for other, rival in finding.candidates.items():
+            if len(other) == len(effects) and rest < set(other) and name not in other:
+                if candidate.evidence - rival.evidence < ALIKE and rival.evidence > ENOUGH:
+                    others += list(set(other) - rest)
+    return tuple(sorted(set(others)))
+
+
+def _sites(finding: Finding, sets, unknown: float) -> dict[str, float]:
+    """Probability that each site takes part; an unknown cause lies where the corrector's terms do."""
+    rest = sum(gain for _, gain in finding.terms) or 1.0
+    found = {}
+    for site in SITES:
+        known = sum(p for effects, p in sets if any(CATALOGUE[name].site == site for name in effects))
+        lies = sum(gain for term, gain in finding.terms if term.site == site) / rest
+        found[site] = float(min(known + unknown * lies, 1.0))
+    return found

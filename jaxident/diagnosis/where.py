@@ -1,0 +1,101 @@
+"""Where the gap lies: excess error by channel and over what the robot was doing, with false-discovery control."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jaxident.array_types import Array
+from jaxident.diagnosis.gap import CHANNELS
+from jaxident.diagnosis.responses import modelled_path
+from jaxident.diagnosis.windows import Windows
+
+BINS = 4
+SHUFFLES = 2000
+DISCOVERIES = 0.05
+"""Share of false regions allowed among those reported (Benjamini and Hochberg 1995)."""
+
+
+class Region(NamedTuple):
+    """A part of a variable's range in which the excess error is larger than elsewhere: its share of all excess, and the
+    probability of such a mean by chance, adjusted for all regions looked at."""
+
+    variable: str
+    low: float
+    high: float
+    share: float
+    p_value: float
+
+
+class Place(NamedTuple):
+    """Shares of the excess by channel; regions, largest share first; and the map: for each variable the bins' edges and
+    the mean excess in each."""
+
+    channels: dict[str, float]
+    regions: list[Region]
+    table: dict[str, tuple[Any, Any]]
+
+
+def locate(errors: Array, floor: Array, residual: Array, windows: Windows) -> Place:
+    """From errors and their floor (windows, 3) at the horizon, and the residuals (windows, numbers) of that model."""
+    kept = np.isfinite(errors).all(axis=1)
+    excess = (errors - floor)[kept]
+    total = np.maximum(excess.mean(axis=0), 0.0)
+    share = total / total.sum() if total.sum() > 0.0 else np.zeros(3)
+    variables = {name: value[kept] for name, value in describe(residual, windows).items()}
+    return Place(dict(zip(CHANNELS, share.tolist(), strict=True)), *_regions(excess.mean(axis=1), variables))
+
+
+def describe(residual: Array, windows: Windows) -> dict[str, np.ndarray]:
+    """What the robot did in each window (windows,): levels, speeds, reversals, rest, heading, position, session time."""
+    x, y, theta = modelled_path(residual, windows)
+    step = np.asarray(windows.step).T
+    rows = np.arange(step.shape[1])
+    places = np.minimum(windows.first + rows[:, None], len(windows.command) - 1)
+    u = np.asarray(windows.command)[places, windows.run]
+    direction = theta[:, :-1] + 0.5 * np.diff(theta, axis=1)
+    v = (np.diff(x, axis=1) * np.cos(direction) + np.diff(y, axis=1) * np.sin(direction)) / step[:, :-1]
+    w = np.diff(theta, axis=1) / step[:, :-1]
+    return {
+        "u_r": u[..., 0].mean(axis=0), "u_l": u[..., 1].mean(axis=0),
+        "|u|": np.abs(u).mean(axis=(0, 2)), "largest |u|": np.abs(u).max(axis=(0, 2)),
+        "v": v.mean(axis=1), "w": w.mean(axis=1), "|v|": np.abs(v).mean(axis=1), "|w|": np.abs(w).mean(axis=1),
+        "v w": (v * w).mean(axis=1), "w^2": (w * w).mean(axis=1),
+        "reversals": (np.diff(np.sign(u), axis=0) != 0).sum(axis=(0, 2)).astype(float),
+        "rest": np.mean(np.abs(u) < 0.05, axis=(0, 2)),
+        "heading": np.arctan2(np.sin(theta), np.cos(theta))[:, -1], "x": x.mean(axis=1), "y": y.mean(axis=1),
+        "session time": windows.session[windows.run] + windows.t[windows.first, windows.run],
+    }  # fmt: skip
+
+
+def _regions(excess: Array, variables: dict[str, np.ndarray]) -> tuple[list[Region], dict]:
+    """Bins of each variable by its quantiles, tested by shuffling the excess over windows."""
+    rng = np.random.default_rng(3)
+    shuffled = np.stack([rng.permutation(excess) for _ in range(SHUFFLES)])
+    found, table = [], {}
+    for name, value in variables.items():
+        edges = np.unique(np.quantile(value, np.linspace(0.0, 1.0, BINS + 1)))
+        if len(edges) < 3:
+            continue
+        bins = np.clip(np.searchsorted(edges, value, side="right") - 1, 0, len(edges) - 2)
+        members = bins == np.arange(len(edges) - 1)[:, None]
+        counts = np.maximum(members.sum(axis=1), 1)
+        means = members @ excess / counts
+        chance = (1.0 + np.sum(shuffled @ members.T / counts >= means - 1e-12, axis=0)) / (1.0 + SHUFFLES)
+        share = members @ excess / max(float(np.sum(np.maximum(excess, 0.0))), 1e-300)
+        table[name] = edges, means
+        found += [
+            Region(name, float(edges[k]), float(edges[k + 1]), float(share[k]), float(chance[k]))
+            for k in range(len(counts))
+        ]
+    return _discoveries(found), table
+
+
+def _discoveries(regions: list[Region]) -> list[Region]:
+    """Those that stand at the false-discovery rate, with adjusted probabilities."""
+    order = sorted(regions, key=lambda region: -region.p_value)
+    lowest, kept = 1.0, []
+    for rank, region in zip(range(len(order), 0, -1), order, strict=True):
+        lowest = min(lowest, region.p_value * len(order) / rank)
+        if lowest <= DISCOVERIES and region.share > 0.0:
+            kept.append(region._replace(p_value=lowest))
+    return sorted(kept, key=lambda region: -region.share)
