@@ -33,6 +33,7 @@ _HOMES = {
     "path_length": "jaxident.robot.path_length",
     "EXCITATIONS": "jaxident.robot.excitation",
     "identify": "jaxident.estimation.identify",
+    "diagnose": "jaxident.diagnosis.diagnose",
     "cramer_rao": "jaxident.estimation.precision",
     "predict": "jaxident.estimation.predict",
     "read_log": "jaxident.files.logs",

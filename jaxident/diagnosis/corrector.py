@@ -115,7 +115,7 @@ def _camera(x, y, theta, v, w, time) -> dict[str, np.ndarray]:
 def pursue(products: Array, base: list[int], candidates: list[int]) -> list[tuple[int, float]]:
     """Candidates (columns of products, the residual last) in the order in which they explain most, each with the fall
     of -log p that it brings, as long as it is worth it; `base` columns are free throughout."""
-    own, cross, scale = normal(products, [*base, *candidates], ridge=1e-9)
+    own, cross, _ = normal(products, [*base, *candidates], ridge=1e-9)
     left = np.array(own)
     right = np.array(cross)
     count = len(base)

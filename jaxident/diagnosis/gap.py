@@ -47,7 +47,8 @@ def errors(vectors: Array, starts: Array, windows: Windows, law: Law, responses:
 
 
 def floor_of(vector: Array, residual: Array, windows: Windows, law: Law, responses: Responses, burn: int) -> Floor:
-    """The floor by replay of noise through the linear estimate about a model's path, with residuals (windows, numbers)."""
+    """The floor by replay of noise through the linear estimate about the path of a model with some residuals (windows,
+    numbers)."""
     inverse, rows = _early(law, windows, responses, burn)
     slope = answer_to_start(np.exp(vector[:2]), residual, windows)
     early = slope[:, :rows]

@@ -15,7 +15,6 @@ from jaxident.effects.actuation import (
     backlash,
     direction_gain,
     input_quantisation,
-    input_rate_limit,
     input_saturation,
     motor_lag,
 )
@@ -145,7 +144,8 @@ def _played(width: Array, mean: Array, slope: Array, size: Array) -> tuple[Array
     """What passes the play: nothing for a first part of some substeps."""
 
     def body(position, now):
-        return backlash(position, *now, width)
+        mean, own = now
+        return backlash(position, mean, own, width)
 
     free = jax.lax.scan(body, jnp.zeros_like(mean[0]), (mean, size))[1]
     driving = 1.0 - free

@@ -11,7 +11,7 @@ import jax
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.coordinates import SIZE, limits, sizes
+from jaxident.diagnosis.coordinates import limits, sizes
 from jaxident.diagnosis.paths import residuals
 from jaxident.diagnosis.responses import answer_to_start
 from jaxident.diagnosis.windows import Windows
@@ -94,7 +94,7 @@ def _left(products: Array, columns: list[int]) -> float:
     last = len(products) - 1
     if not columns:
         return 0.5 * float(products[last, last])
-    own, cross, scale = normal(products, columns)
+    own, cross, _ = normal(products, columns)
     return 0.5 * float(products[last, last] - cross @ np.linalg.solve(own, cross))
 
 
@@ -103,6 +103,3 @@ def normal(products: Array, columns: list[int], ridge: float = 1e-10) -> tuple[n
     own = products[np.ix_(columns, columns)]
     scale = np.sqrt(np.maximum(np.diagonal(own), 1e-300))
     return own / scale[:, None] / scale + ridge * np.eye(len(columns)), products[columns, -1] / scale, scale
-
-
-__all__ = ["SIZE", "Gram", "Linear", "explained", "follow", "gram", "linearise", "normal"]

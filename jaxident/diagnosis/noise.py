@@ -5,7 +5,7 @@ what it takes up of the residuals is not lost from the noise. The covariance is 
 searched by average information (Gilmour, Thompson and Cullis 1995, Biometrics 51). NumPy, windows first.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -45,12 +45,12 @@ def first_law(windows: Windows) -> Law:
     """Camera error by fourth differences of the poses, which motion hardly enters; the median forgives switches."""
     pose, seen = np.asarray(windows.pose), np.asarray(windows.seen)
     whole = np.all([seen[k : len(seen) - 4 + k] for k in range(5)], axis=0)
-    found = []
+    found: list[float] = []
     for k in range(3):
         column = np.unwrap(pose[..., k], axis=0) if k == 2 else pose[..., k]
         change = np.diff(column, n=4, axis=0)[whole]
         found.append(float(np.median(np.abs(change))) / 0.6745 / np.sqrt(70.0) if change.size else 1e-3)
-    return Law(max(np.hypot(*found[:2]) / np.sqrt(2.0), 1e-7), max(found[2], 1e-7))
+    return Law(max(float(np.hypot(found[0], found[1])) / 2.0**0.5, 1e-7), max(found[2], 1e-7))
 
 
 def covariance(law: Law, windows: Windows, responses: Responses) -> np.ndarray:

@@ -51,16 +51,20 @@ class Prepared(NamedTuple):
     law: Law
 
 
-def prepare(logs, horizon: float | None, nominal: Array | None = None) -> Prepared:
+def prepare(
+    logs, horizon: float | None, nominal: Array | None = None, like: "Prepared | None" = None, law: Law | None = None
+) -> Prepared:
     """Windows, roles and the nominal fit; `nominal` (10,) is where its search begins, from the data alone without.
 
-    InputError where the log says nothing: no motion, no excitation, too few poses.
+    With `like` the commands are scaled as there, and with `law` the noise is taken for that: logs of a simulator, often
+    free of noise, are judged by what the robot's camera could see. InputError where the log says nothing: no motion, no
+    excitation, too few poses.
     """
     log = join(logs)
     check_informative(log)
-    largest = float(np.nanmax(np.abs(np.stack(log.command))))
+    largest = float(np.nanmax(np.abs(np.stack(log.command)))) if like is None else like.largest
     log = log._replace(u_r=np.asarray(log.u_r) / largest, u_l=np.asarray(log.u_l) / largest)
-    frozen = find_repeats(log)
+    frozen = find_repeats(log) if law is None else np.zeros(len(log.t), bool)
     log = blind(log, frozen)
     period = float(np.median(np.concatenate([np.diff(run.t) for run in log.runs()])))
     rows, horizon = horizon_rows(horizon, period)
@@ -69,7 +73,9 @@ def prepare(logs, horizon: float | None, nominal: Array | None = None) -> Prepar
         raise InputError(f"{len(log.t)} rows: too few for windows of {BURN + rows} rows; record longer runs")
     vector = neutral_vector(starting_point(log) if nominal is None else nominal)
     naming = roles(windows)
-    first = rough_fit(windows, naming, vector)
+    first = rough_fit(windows, naming, vector, law)
+    if law is not None:
+        return Prepared(log, largest, windows, naming, horizon, Frames(frozen, frozen), first, law)
     outlying = find_outliers(log, windows, first)
     if outlying.any():
         windows = cut(blind(log, outlying), BURN + rows)
@@ -88,7 +94,8 @@ def horizon_rows(horizon: float | None, period: float) -> tuple[int, float]:
         rows = round(horizon / period)
         if not 1 <= rows <= 4 * LONGEST:
             raise InputError(
-                f"horizon: {horizon:g} s is {rows} samples of this log; it may be {period:g} to {4 * LONGEST * period:g} s"
+                f"horizon: {horizon:g} s is {rows} samples of this log; "
+                f"{period:g} to {4 * LONGEST * period:g} s are allowed"
             )
     return rows, rows * period
 
@@ -104,9 +111,9 @@ def starting_point(log: Log) -> np.ndarray:
     return point
 
 
-def rough_fit(windows: Windows, naming: Array, vector: Array) -> Solution:
-    """The nominal fit for white camera noise as fourth differences size it."""
-    law = first_law(windows)
+def rough_fit(windows: Windows, naming: Array, vector: Array, law: Law | None = None) -> Solution:
+    """The nominal fit for white camera noise, of a law or as fourth differences size it."""
+    law = first_law(windows) if law is None else law
     seen = np.repeat(np.asarray(windows.seen).T, 3, axis=1)
     scale = np.tile(1.0 / np.array([law.position, law.position, law.heading]), len(windows.step))
     white = np.eye(len(scale)) * scale * seen[:, :, None]
@@ -131,7 +138,7 @@ def first_starts(windows: Windows) -> np.ndarray:
 
 
 def roles(windows: Windows) -> np.ndarray:
-    """Windows that name, boolean (windows,); the others, every third run from the second on, are used for the gap alone.
+    """Windows that name, boolean (windows,); the others, every third run from the second on, only judge the gap.
 
     Of one or two runs it is stretches of four windows, so that both purposes see early and late.
     """

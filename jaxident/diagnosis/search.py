@@ -25,8 +25,8 @@ class Data(NamedTuple):
 
 
 class Solution(NamedTuple):
-    """A fit: vector (SIZE,), starts (5, windows), the linearisation there in `places`, half the squares over the windows
-    used, and the covariance of the free coordinates."""
+    """A fit: vector (SIZE,), starts (5, windows), the linearisation there in `places`, half the squares over the
+    windows used, and the covariance of the free coordinates."""
 
     vector: Any
     starts: Any
@@ -117,4 +117,5 @@ def _covariance(products: Array) -> np.ndarray:
     own, _, scale = normal(products, list(range(len(products) - 1)), ridge=0.0)
     values, vectors = np.linalg.eigh(own)
     rows = vectors / np.sqrt(np.maximum(values, 1e-12))
+    scale = np.maximum(scale, 1e-100)  # a coordinate without any answer: enormous, and finite
     return rows @ rows.T / scale[:, None] / scale

@@ -10,7 +10,6 @@ from jaxident.diagnosis.coordinates import (
     COORDINATES,
     NOMINAL,
     PLACES,
-    SHAPES,
     natural,
     nominal_vector,
     to_catalogue,
@@ -41,9 +40,9 @@ def to_coordinates(model: Model, logs: Log | Sequence[Log]) -> np.ndarray:
     return np.concatenate([point[:2], point[2:] / largest ** _POWERS[2:]])
 
 
-def given_parameters(model: Model) -> list[float]:
-    """The nominal parameters (10,) of a model in the order of NOMINAL."""
-    return natural(nominal_vector(require_physical(model), np.asarray(model.dead_zone))).tolist()
+def in_user_units(point: Array, largest: float) -> list[float]:
+    """Nominal parameters in the order of NOMINAL from coordinates for commands over `largest`."""
+    return (natural(point) * float(largest) ** _POWERS).tolist()
 
 
 def parameters_of(solution: Solution, largest: float) -> tuple[tuple[str, ...], list[float], list[float]]:
@@ -78,7 +77,7 @@ def to_model(
     prepared: Prepared, solution: Solution, law: Law, effects: tuple[str, ...], direct: dict[str, dict] | None = None
 ) -> Model:
     """A solution as a model with its noise law and effects, `direct` ones by their parameters."""
-    _, values, deviations = parameters_of(solution, prepared.largest)
+    _, values, _ = parameters_of(solution, prepared.largest)
     steps = np.concatenate([np.diff(run.t) for run in prepared.log.runs()])
     found = [effect_of(name, solution, prepared.largest) for name in effects]
     found += [Effect(name, dict(parameters)) for name, parameters in (direct or {}).items()]
@@ -98,13 +97,3 @@ def noise_of(law: Law) -> Noise:
     slip = law.slip or (0.0, 0.0)
     density = float(np.sqrt(2.0 * law.slip_time)) if law.slip_time else 0.0
     return Noise(law.position, law.heading, None, slip[0] * density, slip[1] * density)
-
-
-def is_shape(name: str, key: str) -> bool:
-    """Whether a coordinate only shapes its effect."""
-    return (name, key) in SHAPES
-
-
-def scaled(point: Array, largest: float) -> np.ndarray:
-    """Nominal coordinates for commands over `largest` as those in the user's unit."""
-    return np.concatenate([point[:2], point[2:10] * float(largest) ** _POWERS[2:]])

@@ -37,9 +37,9 @@ class Judgement(NamedTuple):
     sites: dict[str, float]
 
 
-def judge(finding: Finding, extra: dict[str, float]) -> Judgement:
+def judge(finding: Finding, extra: dict[str, float], common: tuple[str, ...] = ()) -> Judgement:
     """Probabilities from the candidates, from what the corrector still explains, and from effects found directly in the
-    frames or in the noise law (`extra`: name to evidence)."""
+    frames or in the noise law (`extra`: name to evidence). `common` effects are in the simulator already: no gap."""
     sure = tuple(name for name, evidence in extra.items() if evidence > ENOUGH)
     weights = {effects: (c.evidence - ENOUGH * len(effects)) / TEMPERATURE for effects, c in finding.candidates.items()}
     top = max(weights.values())
@@ -49,7 +49,7 @@ def judge(finding: Finding, extra: dict[str, float]) -> Judgement:
     known = 1.0 - unknown
     sets: dict[tuple[str, ...], float] = {}
     for effects, p in chance.items():
-        key = tuple(sorted((*effects, *sure)))
+        key = tuple(sorted({*effects, *sure} - set(common)))
         sets[key] = sets.get(key, 0.0) + known * p
     none = sets.pop((), 0.0)
     ordered = sorted(((key, p) for key, p in sets.items() if p > 1e-4), key=lambda pair: -pair[1])
@@ -85,19 +85,15 @@ def _causes(finding: Finding, sets) -> list[Cause]:
 
 
 def alike(finding: Finding, name: str) -> tuple[str, ...]:
-    """Effects that stand in place of one in a set whose evidence is nearly as good."""
-    others = []
-    for effects, candidate in finding.candidates.items():
-        if name not in effects:
-            continue
-        rest = set(effects) - {name}
-        if effects != finding.selected and name in finding.selected:
-            continue
-        for other, rival in finding.candidates.items():
-            if len(other) == len(effects) and rest < set(other) and name not in other:
-                if candidate.evidence - rival.evidence < ALIKE and rival.evidence > ENOUGH:
-                    others += list(set(other) - rest)
-    return tuple(sorted(set(others)))
+    """Effects that in place of one in the selected set leave the evidence nearly as good."""
+    if name not in finding.selected:
+        return ()
+    rest = set(finding.selected) - {name}
+    least = max(finding.candidates[finding.selected].evidence - ALIKE, ENOUGH)
+    rivals = [
+        e for e, c in finding.candidates.items() if len(e) == len(rest) + 1 and rest < set(e) and c.evidence > least
+    ]
+    return tuple(sorted({other for effects in rivals for other in set(effects) - rest} - {name}))
 
 
 def _sites(finding: Finding, sets, unknown: float) -> dict[str, float]:

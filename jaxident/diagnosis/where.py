@@ -46,7 +46,7 @@ def locate(errors: Array, floor: Array, residual: Array, windows: Windows) -> Pl
 
 
 def describe(residual: Array, windows: Windows) -> dict[str, np.ndarray]:
-    """What the robot did in each window (windows,): levels, speeds, reversals, rest, heading, position, session time."""
+    """What the robot did in each window (windows,): levels, speeds, reversals, rest, heading, position, time."""
     x, y, theta = modelled_path(residual, windows)
     step = np.asarray(windows.step).T
     rows = np.arange(step.shape[1])

@@ -5,11 +5,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.coordinates import COORDINATES, PLACES, SHAPES, SMOOTH, from_catalogue, unit_factors
+from jaxident.diagnosis.coordinates import COORDINATES, SHAPES
 from jaxident.diagnosis.corrector import library, pursue
-from jaxident.diagnosis.linear import explained, follow, gram, linearise, normal
+from jaxident.diagnosis.linear import gram
 from jaxident.diagnosis.noise import Law, size_noise, whitener_of
 from jaxident.diagnosis.responses import Responses, respond
+from jaxident.diagnosis.scores import best_seed, score
 from jaxident.diagnosis.search import Data, Solution, refit
 from jaxident.diagnosis.windows import Windows
 from jaxident.effects.catalogue import CATALOGUE
@@ -51,25 +52,36 @@ class Finding(NamedTuple):
     scores: dict[str, float]
 
 
-def search_effects(windows: Windows, use: Array, nominal: Solution, law: Law) -> Finding:
-    """From the nominal fit under a noise law to a selected set; `use` (boolean, windows) are those that name."""
+def search_effects(windows: Windows, use: Array, nominal: Solution, law: Law, *, sized: bool = True) -> Finding:
+    """From the nominal fit under a noise law to a selected set; `use` (boolean, windows) are those that name.
+
+    The law is sized again at the best fit, for the nominal one takes what is missing for slip; not so if `sized` is
+    False.
+    """
     data, responses = whiten(nominal, windows, use, law)
     nominal = refit(data, nominal.vector, nominal.starts, ())
     scores = score(data, nominal)
-    found = {(): Candidate((), nominal, 0.0)}
+    found: dict[tuple[str, ...], Candidate] = {(): Candidate((), nominal, 0.0)}
     _try(found, data, nominal, _with_look_alikes(scores), ())
     best = max(found.values(), key=lambda c: c.evidence)
-    again = size_noise(best.solution.linear.residual, best.solution.linear.starts, windows, responses, use)
+    again = resized(best.solution, data, responses, law, sized)
     data, responses = whiten(best.solution, windows, use, again)
     found = _again(found, data)
     scores = score(data, found[()].solution)
     _try(found, data, found[()].solution, [n for n in _with_look_alikes(scores) if (n,) not in found], ())
     selected = _grow(found, data)
     solution = found[selected].solution
-    again = size_noise(solution.linear.residual, solution.linear.starts, windows, responses, use)
+    again = resized(solution, data, responses, again, sized)
     return Finding(
         data, again, responses, found[()].solution, found, selected, remaining(data, solution, responses), scores
     )
+
+
+def resized(solution: Solution, data: Data, responses: Responses, law: Law, sized: bool) -> Law:
+    """The law sized at a solution, or as it was."""
+    if not sized:
+        return law
+    return size_noise(solution.linear.residual, solution.linear.starts, data.windows, responses, data.use)
 
 
 def whiten(solution: Solution, windows: Windows, use: Array, law: Law) -> tuple[Data, Responses]:
@@ -81,7 +93,7 @@ def whiten(solution: Solution, windows: Windows, use: Array, law: Law) -> tuple[
 def _again(found: dict, data: Data) -> dict:
     """The best candidates under another noise law, from where they were."""
     nominal = refit(data, found[()].solution.vector, found[()].solution.starts, ())
-    fresh = {(): Candidate((), nominal, 0.0)}
+    fresh: dict[tuple[str, ...], Candidate] = {(): Candidate((), nominal, 0.0)}
     order = sorted((effects for effects in found if effects), key=lambda effects: -found[effects].evidence)
     for effects in order[:KEPT]:
         candidate = found[effects]
@@ -124,79 +136,6 @@ def _grow(found: dict, data: Data) -> tuple[str, ...]:
     return selected
 
 
-def seeds(name: str, windows: Windows) -> list[dict[str, float]]:
-    """Points from which an effect without a derivative at neutral is looked for; one neutral point for the others."""
-    if name == "input_saturation":
-        return [{"level": level} for level in (0.9, 0.75, 0.6, 0.45, 0.3)]
-    if name == "input_quantisation":
-        return [{"step": step} for step in (0.03, 0.05, 0.08, 0.12, 0.17, 0.25, 0.35)]
-    if name == "stiction":
-        return [{"right": s, "left": s, "fade": fade} for s, fade in ((0.05, 0.05), (0.15, 0.05), (0.1, 0.15))]
-    if name == "payload_change":
-        last = float(windows.session[-1] + windows.t[-1, -1])
-        return [{"loss": 0.1, "instant": last * part} for part in np.linspace(0.06, 0.94, 12)]
-    if name == "lens_distortion":
-        return [{"strength": 0.01}]
-    return [{}]
-
-
-def seeded(vector: Array, name: str, seed: dict[str, float]) -> np.ndarray:
-    """A vector with an effect at a seed."""
-    moved = np.array(vector)
-    for key, value in seed.items():
-        moved[PLACES[name, key]] = value
-    return moved
-
-
-def score(data: Data, solution: Solution) -> dict[str, float]:
-    """What each effect promises to explain beyond a solution, its coordinates free: a linear prediction by the
-    derivative at neutral, or by the difference that its best seed makes."""
-    smooth = [
-        PLACES[name, c.name] for name in SMOOTH for c in COORDINATES[name] if c.name not in ("centre_x", "centre_y")
-    ]
-    free = list(solution.places)
-    linear = linearise(solution.vector, solution.starts, data.windows, [*free, *(p for p in smooth if p not in free)])
-    places = [*free, *(p for p in smooth if p not in free)]
-    jumps = [(name, seed) for name in COORDINATES if name not in SMOOTH and PLACES[name, COORDINATES[name][0].name] not in free
-             for seed in seeds(name, data.windows)]  # fmt: skip
-    vectors = (
-        np.stack([seeded(solution.vector, *jump) for jump in jumps]) if jumps else np.zeros((0, len(solution.vector)))
-    )
-    moved = follow(vectors, np.broadcast_to(solution.starts, (len(vectors), *solution.starts.shape)), data.windows)
-    change = np.moveaxis(linear.residual[None] - moved, 0, -1)
-    columns = np.concatenate([linear.slopes, change, linear.residual[..., None]], axis=2)[data.use]
-    products = gram(data.whitener[data.use], columns, linear.starts[data.use]).products.sum(axis=0)
-    base = list(range(len(free)))
-    place_of = {place: k for k, place in enumerate(places)}
-    scores = {}
-    for name in SMOOTH:
-        own = [
-            place_of[PLACES[name, c.name]]
-            for c in COORDINATES[name]
-            if (name, c.name) in PLACES and PLACES[name, c.name] in place_of
-        ]
-        own = [k for k in own if k >= len(free)]
-        scores[name] = explained(products, base, own) if own else 0.0
-    for k, (name, _) in enumerate(jumps):
-        scores[name] = max(scores.get(name, 0.0), explained(products, base, [len(places) + k]))
-    return scores
-
-
-def best_seed(data: Data, solution: Solution, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Where to start the refit of one more effect: at neutral, or at the seed that promises most."""
-    points = seeds(name, data.windows)
-    if name in SMOOTH or len(points) == 1:
-        return seeded(solution.vector, name, points[0]), solution.starts
-    vectors = np.stack([seeded(solution.vector, name, seed) for seed in points])
-    moved = follow(vectors, np.broadcast_to(solution.starts, (len(vectors), *solution.starts.shape)), data.windows)
-    change = np.moveaxis(solution.linear.residual[None] - moved, 0, -1)
-    columns = np.concatenate([solution.linear.slopes, change, solution.linear.residual[..., None]], axis=2)[data.use]
-    products = gram(data.whitener[data.use], columns, solution.linear.starts[data.use]).products.sum(axis=0)
-    base = list(range(len(solution.places)))
-    gains = [explained(products, base, [len(base) + k]) for k in range(len(points))]
-    return vectors[int(np.argmax(gains))], solution.starts
-
-
 def _ranked(scores: dict[str, float]) -> list[str]:
     return sorted(scores, key=lambda name: -(scores[name] - PENALTY * len(COORDINATES[name])))
 
@@ -206,33 +145,6 @@ def _with_look_alikes(scores: dict[str, float]) -> list[str]:
     best = _ranked(scores)[:REFITS]
     near = [other for name in best[:2] for other in CATALOGUE[name].confused_with if other in COORDINATES]
     return list(dict.fromkeys([*best, *near]))
-
-
-def visible(data: Data, nominal: Solution, largest: float, duration: float) -> dict[str, float]:
-    """The gain that each effect of the catalogue's typical size would have, nominal parameters refitted: what this
-    input can show. Commands are over `largest`; duration [s] of all runs."""
-    vectors = []
-    for name in COORDINATES:
-        typical = CATALOGUE[name].typical()
-        if name == "payload_change":
-            typical["instant"] = 0.5 * duration
-        factors = unit_factors(name, largest)
-        inner = {key: value / factors[key] for key, value in typical.items()}
-        vectors.append(seeded(nominal.vector, name, from_catalogue(name, inner)))
-    starts = np.broadcast_to(nominal.starts, (len(vectors), *nominal.starts.shape))
-    change = np.moveaxis(nominal.linear.residual[None] - follow(np.stack(vectors), starts, data.windows), 0, -1)
-    columns = np.concatenate([nominal.linear.slopes, change], axis=2)[data.use]
-    products = gram(data.whitener[data.use], columns, nominal.linear.starts[data.use]).products.sum(axis=0)
-    base = list(range(len(nominal.places)))
-    return {name: _alone(products, base, len(base) + k) for k, name in enumerate(COORDINATES)}
-
-
-def _alone(products: Array, base: list[int], column: int) -> float:
-    """Half the squares of a column that others do not explain."""
-    order = [*base, column]
-    own = products[np.ix_(order, order)]
-    matrix, right, _ = normal(own, base)
-    return max(0.5 * float(own[-1, -1] - right @ np.linalg.solve(matrix, right)), 0.0)
 
 
 def remaining(data: Data, solution: Solution, responses: Responses) -> list[tuple[Any, float]]:

@@ -1,0 +1,73 @@
+"""`jaxident diagnose`."""
+
+import os
+
+import click
+
+from jaxident.cli.progress import working
+from jaxident.cli.session import seed_option, table, write_json, wrote
+from jaxident.start import start_jax
+
+SENTENCE = {
+    "no_gap": "no gap: the nominal model predicts these runs as well as their noise allows",
+    "parameters": "the model's form is right, its parameters are not",
+    "effects": "the nominal model misses {effects}",
+    "unknown": "there is a gap that no effect of the catalogue explains",
+    "undecided": "undecided: more data are needed",
+}
+
+
+@click.command()
+@click.argument("logs", nargs=-1, required=True, metavar="LOG...")
+@click.option("--sim", multiple=True, metavar="LOG", help="Logs of your own simulator, repeatable: what does it lack?")
+@click.option("--model", metavar="MODEL", help="A nominal model to judge as it stands.")
+@click.option("--horizon", type=click.FloatRange(0, min_open=True), metavar="S", help="Seconds ahead (default: 1).")
+@click.option("--out", default="diagnosis", show_default=True, metavar="DIR", help="The folder to write.")
+@seed_option
+def command(logs, sim, model, horizon, out, seed):
+    """The sim-to-real gap: where it lies, which unmodelled effect causes it, how far it shrinks with that effect.
+
+    LOG: files or a folder; in a folder `sim_*` are logs of your simulator. The same logs and seed give the same result.
+
+    Example: jaxident diagnose run_1.csv run_2.csv run_3.csv --out diagnosis
+    """
+    start_jax()
+    from jaxident.diagnosis.diagnose import diagnose
+    from jaxident.files.diagnosis import diagnosis_to_dict
+    from jaxident.files.logs import find_simulated, read_log, read_logs
+    from jaxident.files.models import load_model, save_model
+
+    records = read_logs(logs)
+    theirs = read_logs(sim) if sim else [read_log(path) for path in find_simulated(logs)]
+    nominal = load_model(model) if model else None
+    with working("diagnosing"):
+        found = diagnose(records, sim=theirs or None, model=nominal, horizon=horizon)
+    content = diagnosis_to_dict(found)
+    click.echo(f"verdict: {SENTENCE[found.verdict].format(effects=' and '.join(found.selected))}")
+    click.echo(table([("cause", "probability", "site"), *_causes(found)]))
+    click.echo(_gap(found))
+    click.echo(found.next)
+    os.makedirs(out, exist_ok=True)
+    write_json(content, os.path.join(out, "diagnosis.json"))
+    for name, written in (("nominal_model", found.nominal_model), ("corrected_model", found.corrected_model)):
+        path = os.path.join(out, f"{name}.json")
+        save_model(written, path)
+        wrote(path)
+
+
+def _causes(found) -> list[tuple[str, ...]]:
+    rows = [(c.effect, f"{c.probability:.3f}", c.site) for c in found.judgement.causes]
+    rows.append(("none", f"{found.judgement.none:.3f}", ""))
+    return [*rows, ("unknown", f"{found.judgement.unknown:.3f}", "")]
+
+
+def _gap(found) -> str:
+    gap = found.gap
+    line = (
+        f"squared pose error at {gap.horizon:.3g} s over the camera's variance: {gap.before:.3g} as given, "
+        f"{gap.refitted:.3g} refitted, {gap.after:.3g} corrected, floor {gap.floor:.3g}"
+    )
+    if gap.shrink.value is None or gap.shrink.interval is None:
+        return line
+    low, high = gap.shrink.interval
+    return f"{line}; the gap shrinks by {100 * gap.shrink.value:.0f} % ({100 * low:.0f} to {100 * high:.0f} %)"

@@ -1,0 +1,31 @@
+"""Effects that show without a refit: frames that repeat, outliers, a camera error with a memory."""
+
+from jaxident.diagnosis.prepare import Prepared
+from jaxident.diagnosis.which import ENOUGH, Finding
+
+
+def direct_evidence(prepared: Prepared, finding: Finding) -> dict[str, float]:
+    """Evidence for effects that are seen in the frames themselves or sized with the noise."""
+    rows = len(prepared.log.t)
+    frozen, outlying = int(prepared.frames.frozen.sum()), int(prepared.frames.outlying.sum())
+    return {
+        "frozen_frames": 10.0 * frozen if frozen >= 3 else 0.0,
+        # seven standard deviations by chance are less than one in 10^8 rows
+        "outliers": 10.0 * outlying if outlying >= max(3, 1e-4 * rows) else 0.0,
+        "coloured_noise": 2.0 * ENOUGH if finding.law.coloured is not None else 0.0,
+    }
+
+
+def direct_effects(prepared: Prepared, finding: Finding, selected) -> dict[str, dict[str, float]]:
+    """Parameters of the selected effects among these."""
+    rows = max(len(prepared.log.t), 1)
+    found = {}
+    if "frozen_frames" in selected:
+        found["frozen_frames"] = {"probability": float(prepared.frames.frozen.sum() / rows)}
+    if "outliers" in selected:
+        found["outliers"] = {"probability": float(prepared.frames.outlying.sum() / rows)}
+    if "coloured_noise" in selected and finding.law.coloured is not None:
+        position, heading = finding.law.coloured
+        time = float(finding.law.coloured_time or 0.0)
+        found["coloured_noise"] = {"position": position, "heading": heading, "correlation_time": time}
+    return found

@@ -1,0 +1,104 @@
+"""The gap on windows kept for it: before, refitted, corrected; where it lies; how far each effect shrinks it."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jaxident.diagnosis.gap import Floor, Shrink, errors, floor_of, shrink_of
+from jaxident.diagnosis.noise import Law
+from jaxident.diagnosis.prepare import BURN, Prepared, first_starts
+from jaxident.diagnosis.responses import respond
+from jaxident.diagnosis.search import Data, refit
+from jaxident.diagnosis.where import Place, locate
+from jaxident.diagnosis.which import Finding
+from jaxident.diagnosis.windows import Windows, cut
+from jaxident.log import Log
+
+
+class Gap(NamedTuple):
+    """Mean squared pose error over the camera's variance at the horizon [s], three channels alike, on runs used for
+    nothing else: the model as given, refitted, with the selected effects; the floor and its 90 % interval; the shrink.
+    `placebo`: the shrink of an effect that nothing speaks for. errors (models, windows, 3): before, refitted, after."""
+
+    horizon: float
+    before: float
+    refitted: float
+    after: float
+    floor: float
+    floor_interval: tuple[float, float]
+    shrink: Shrink
+    placebo: tuple[str, Shrink] | None
+    errors: Any
+    replay: Floor
+
+
+def measure(prepared: Prepared, finding: Finding, given, common) -> tuple[Gap, Place, dict[str, Shrink]]:
+    """The gap on windows kept for it, before and after, where it lies, and the shrink of each single effect; `given`
+    (10,) or (SIZE,) is the model as given, `common` are effects that it has already."""
+    rows = len(prepared.windows.step)
+    windows = judging_windows(prepared, rows)
+    law, best = finding.law, finding.candidates[finding.selected].solution
+    singles = {e[0]: c for e, c in finding.candidates.items() if len(e) == 1}
+    base = finding.candidates.get(common, finding.candidates[()]).solution.vector
+    told = base if given is None else np.concatenate([given, finding.nominal.vector[len(given) :]])
+    vectors = np.stack([told, base, best.vector, *(c.solution.vector for c in singles.values())])
+    responses, residual, starts = _settle(best.vector, windows, law)
+    found = errors(vectors, np.tile(starts, (len(vectors), 1, 1)), windows, law, responses, BURN)
+    replay = floor_of(best.vector, residual, windows, law, responses, BURN)
+    mean = np.nanmean(found, axis=(1, 2))
+    shrinks = {name: shrink_of(found[1], found[3 + k], replay) for k, name in enumerate(singles)}
+    weakest = min(singles.values(), key=lambda c: c.gain, default=None)
+    placebo = None if weakest is None else (weakest.effects[0], shrinks[weakest.effects[0]])
+    spread = np.quantile(replay.replays, [0.05, 0.95])
+    before, refitted, after = (float(value) for value in mean[:3])
+    gap = Gap(
+        prepared.horizon, before, refitted, after, replay.value, (float(spread[0]), float(spread[1])),
+        shrink_of(found[1], found[2], replay), placebo, found[:3], replay,
+    )  # fmt: skip
+    seen = np.asarray(windows.seen)[-1]
+    floor = np.full(found[1].shape, np.nan)
+    floor[seen] = replay.channels
+    return gap, locate(found[1], floor, residual, windows), shrinks
+
+
+def judging_windows(prepared: Prepared, rows: int) -> Windows:
+    """Windows of the runs that judge, overlapping by two thirds; of one or two runs, those that do not name."""
+    windows = prepared.windows
+    own = ~prepared.naming
+    if len(np.unique(windows.run)) < 3:
+        chosen = np.flatnonzero(own)
+        return pick(windows, chosen, len(own))
+    dense = cut(blinded(prepared), rows, stride=max(rows // 3, 1), session=windows.session)
+    chosen = np.flatnonzero(dense.run % 3 == 1)
+    return pick(dense, chosen, len(own))
+
+
+def blinded(prepared: Prepared) -> Log:
+    """The log as the windows saw it."""
+    hidden = prepared.frames.outlying
+    x, y, theta = (np.where(hidden, np.nan, column) for column in prepared.log.pose)
+    return prepared.log._replace(x=x, y=y, theta=theta)
+
+
+def pick(windows: Windows, chosen, count: int) -> Windows:
+    """Some windows, spread evenly if there are more than `count`; else filled up with unseen copies of the first, so
+    that the program compiled for `count` serves them."""
+    if len(chosen) > count:
+        chosen = chosen[np.linspace(0, len(chosen) - 1, count).round().astype(int)]
+    filled = np.concatenate([chosen, np.repeat(chosen[:1], count - len(chosen))])
+    seen = np.array(windows.seen[:, filled])
+    seen[:, len(chosen) :] = False
+    seen[:2, len(chosen) :] = True  # a window without any pose has no start
+    return windows._replace(step=windows.step[:, filled], pose=windows.pose[:, filled], seen=seen,
+                            run=windows.run[filled], first=windows.first[filled])  # fmt: skip
+
+
+def _settle(vector, windows: Windows, law: Law):
+    """Responses, residuals and starts of windows under a model, start states from all their rows."""
+    starts = first_starts(windows)
+    seen = np.repeat(np.asarray(windows.seen).T, 3, axis=1)
+    scale = np.tile(1.0 / np.array([law.position, law.position, law.heading]), len(windows.step))
+    data = Data(windows, np.eye(len(scale)) * scale * seen[:, :, None], np.ones(windows.step.shape[1], bool))
+    solution = refit(data, vector, starts, (), most=3)
+    responses = respond(np.exp(vector[:2]), solution.linear.residual, windows)
+    return responses, solution.linear.residual, solution.starts

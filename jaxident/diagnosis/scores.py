@@ -1,0 +1,112 @@
+"""Scores of all effects from one fit, without refitting: which are worth a refit, and which this input could show."""
+
+import numpy as np
+
+from jaxident.array_types import Array
+from jaxident.diagnosis.coordinates import COORDINATES, PLACES, SHAPES, SMOOTH, from_catalogue, unit_factors
+from jaxident.diagnosis.linear import explained, follow, gram, linearise, normal
+from jaxident.diagnosis.search import Data, Solution
+from jaxident.diagnosis.windows import Windows
+from jaxident.effects.catalogue import CATALOGUE
+
+
+def seeds(name: str, windows: Windows) -> list[dict[str, float]]:
+    """Points from which an effect without a derivative at neutral is looked for; one neutral point for the others."""
+    if name == "input_saturation":
+        return [{"level": level} for level in (0.9, 0.75, 0.6, 0.45, 0.3)]
+    if name == "input_quantisation":
+        return [{"step": step} for step in (0.03, 0.05, 0.08, 0.12, 0.17, 0.25, 0.35)]
+    if name == "stiction":
+        return [{"right": s, "left": s, "fade": fade} for s, fade in ((0.05, 0.05), (0.15, 0.05), (0.1, 0.15))]
+    if name == "payload_change":
+        last = float(windows.session[-1] + windows.t[-1, -1])
+        return [{"loss": 0.1, "instant": last * part} for part in np.linspace(0.06, 0.94, 12)]
+    if name == "lens_distortion":
+        return [{"strength": 0.01}]
+    return [{}]
+
+
+def seeded(vector: Array, name: str, seed: dict[str, float]) -> np.ndarray:
+    """A vector with an effect at a seed."""
+    moved = np.array(vector)
+    for key, value in seed.items():
+        moved[PLACES[name, key]] = value
+    return moved
+
+
+def score(data: Data, solution: Solution) -> dict[str, float]:
+    """What each effect promises to explain beyond a solution, its coordinates free: a linear prediction by the
+    derivative at neutral, or by the difference that its best seed makes."""
+    free = list(solution.places)
+    smooth = {name: [PLACES[pair] for pair in _sizes_of(name) if PLACES[pair] not in free] for name in SMOOTH}
+    more = [place for places in smooth.values() for place in places]
+    linear = linearise(solution.vector, solution.starts, data.windows, [*free, *more])
+    jumps = [
+        (name, seed) for name in COORDINATES if name not in SMOOTH and PLACES[_sizes_of(name)[0]] not in free
+        for seed in seeds(name, data.windows)
+    ]  # fmt: skip
+    change = _differences(data, solution, [seeded(solution.vector, *jump) for jump in jumps])
+    columns = np.concatenate([linear.slopes, change, linear.residual[..., None]], axis=2)[data.use]
+    products = gram(data.whitener[data.use], columns, linear.starts[data.use]).products.sum(axis=0)
+    base, column_of = list(range(len(free))), {place: len(free) + k for k, place in enumerate(more)}
+    scores = {
+        name: explained(products, base, [column_of[p] for p in places]) if places else 0.0
+        for name, places in smooth.items()
+    }
+    for k, (name, _) in enumerate(jumps):
+        gain = explained(products, base, [len(free) + len(more) + k])
+        scores[name] = max(scores.get(name, 0.0), gain)
+    return scores
+
+
+def _sizes_of(name: str) -> list[tuple[str, str]]:
+    """The coordinates of an effect that do something alone."""
+    return [(name, c.name) for c in COORDINATES[name] if (name, c.name) not in SHAPES]
+
+
+def _differences(data: Data, solution: Solution, vectors: list[np.ndarray]) -> np.ndarray:
+    """What poses gain when a solution's vector becomes each of some others, (windows, numbers, vectors)."""
+    if not vectors:
+        return np.zeros((*solution.linear.residual.shape, 0))
+    starts = np.broadcast_to(solution.starts, (len(vectors), *solution.starts.shape))
+    return np.moveaxis(solution.linear.residual[None] - follow(np.stack(vectors), starts, data.windows), 0, -1)
+
+
+def best_seed(data: Data, solution: Solution, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Where to start the refit of one more effect: at neutral, or at the seed that promises most."""
+    points = seeds(name, data.windows)
+    if name in SMOOTH or len(points) == 1:
+        return seeded(solution.vector, name, points[0]), solution.starts
+    vectors = [seeded(solution.vector, name, seed) for seed in points]
+    change = _differences(data, solution, vectors)
+    columns = np.concatenate([solution.linear.slopes, change, solution.linear.residual[..., None]], axis=2)[data.use]
+    products = gram(data.whitener[data.use], columns, solution.linear.starts[data.use]).products.sum(axis=0)
+    base = list(range(len(solution.places)))
+    gains = [explained(products, base, [len(base) + k]) for k in range(len(points))]
+    return vectors[int(np.argmax(gains))], solution.starts
+
+
+def visible(data: Data, nominal: Solution, largest: float, duration: float) -> dict[str, float]:
+    """The gain that each effect of the catalogue's typical size would have, nominal parameters refitted: what this
+    input can show. Commands are over `largest`; duration [s] of all runs."""
+    vectors = []
+    for name in COORDINATES:
+        typical = CATALOGUE[name].typical()
+        if name == "payload_change":
+            typical["instant"] = 0.5 * duration
+        factors = unit_factors(name, largest)
+        inner = {key: value / factors[key] for key, value in typical.items()}
+        vectors.append(seeded(nominal.vector, name, from_catalogue(name, inner)))
+    change = _differences(data, nominal, vectors)
+    columns = np.concatenate([nominal.linear.slopes, change], axis=2)[data.use]
+    products = gram(data.whitener[data.use], columns, nominal.linear.starts[data.use]).products.sum(axis=0)
+    base = list(range(len(nominal.places)))
+    return {name: _alone(products, base, len(base) + k) for k, name in enumerate(COORDINATES)}
+
+
+def _alone(products: Array, base: list[int], column: int) -> float:
+    """Half the squares of a column that others do not explain."""
+    order = [*base, column]
+    own = products[np.ix_(order, order)]
+    matrix, right, _ = normal(own, base)
+    return max(0.5 * float(own[-1, -1] - right @ np.linalg.solve(matrix, right)), 0.0)

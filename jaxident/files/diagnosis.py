@@ -1,0 +1,81 @@
+"""diagnosis.json, "schema": "jaxident.diagnosis/1": what a diagnosis found, for programs."""
+
+from typing import Any
+
+from jaxident.diagnosis.diagnose import Diagnosis, Gap
+from jaxident.effects.catalogue import CATALOGUE
+
+SCHEMA = "jaxident.diagnosis/1"
+
+
+def diagnosis_to_dict(found: Diagnosis) -> dict[str, Any]:
+    """The content of the file."""
+    judgement = found.judgement
+    return {
+        "schema": SCHEMA,
+        "verdict": found.verdict,
+        "probability": {
+            "none": judgement.none,
+            "unknown": judgement.unknown,
+            "sets": [{"effects": list(effects), "p": p} for effects, p in judgement.sets],
+        },
+        "gap": _gap(found.gap),
+        "where": {
+            "site": judgement.sites,
+            "channels": found.where.channels,
+            "regions": [
+                {"variable": r.variable, "from": r.low, "to": r.high, "share": r.share, "p_value": r.p_value}
+                for r in found.where.regions
+            ],
+        },
+        "causes": _causes(found),
+        "selected": list(found.selected),
+        "surplus": list(found.surplus),
+        "parameters": [p._asdict() for p in found.parameters],
+        "not_testable": found.not_testable,
+        "unexplained": [{"site": term.site, "term": term.name, "gain": gain} for term, gain in found.finding.terms],
+        "next": found.next,
+    }
+
+
+def _gap(gap: Gap) -> dict[str, Any]:
+    placebo = None
+    if gap.placebo is not None:
+        name, shrink = gap.placebo
+        placebo = {"effect": name, "shrink": shrink.value, "shrink_interval": _listed(shrink.interval)}
+    return {
+        "horizon": gap.horizon,
+        "before": gap.before,
+        "refitted": gap.refitted,
+        "after": gap.after,
+        "floor": {"value": gap.floor, "interval": list(gap.floor_interval)},
+        "shrink": gap.shrink.value,
+        "shrink_interval": _listed(gap.shrink.interval),
+        "placebo": placebo,
+    }
+
+
+def _listed(interval: tuple[float, float] | None) -> list[float] | None:
+    return None if interval is None else list(interval)
+
+
+def _causes(found: Diagnosis) -> list[dict[str, Any]]:
+    """One object per cause; parameters from the corrected model, or from the effect's own refit."""
+    known = {effect.name: effect for effect in found.corrected_model.effects}
+    rows = []
+    for cause in found.judgement.causes:
+        effect = known.get(cause.effect)
+        shrink = found.shrinks.get(cause.effect)
+        rows.append(
+            {
+                "effect": cause.effect,
+                "site": cause.site,
+                "probability": cause.probability,
+                "parameters": None if effect is None else effect.parameters,
+                "standard_deviation": None if effect is None else effect.standard_deviation,
+                "shrink": None if shrink is None else shrink.value,
+                "indistinguishable_from": list(cause.indistinguishable_from),
+                "extension": CATALOGUE[cause.effect].extension,
+            }
+        )
+    return rows
