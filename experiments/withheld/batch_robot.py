@@ -61,8 +61,8 @@ def simulate(robots, effects, period, u, start, session_time, slip=None, rngs=No
 
     robots: dicts of rate (2,), gain (2, 2), coupling (2,), dead_zone (2,). effects: one {name: {parameter: value}}
     per run. period [s]: (runs,). u: (rows, runs, 2). start: (runs, 3), at rest. session_time [s]: that of the first
-    row, (runs,). slip: random acceleration (rows, runs, 2), held over a row. rngs: a generator per run for its random effects. Runs
-    with dry friction need the finer steps: keep them in a batch of their own.
+    row, (runs,). slip: random acceleration (rows, runs, 2), held over a row. rngs: a generator per run for its random
+    effects. Runs with dry friction need the finer steps: keep them in a batch of their own.
     """
     rubs = any(run.keys() & {"coulomb_friction", "stiction"} for run in effects)
     substeps = substeps or (RUBBING if rubs else SUBSTEPS)
