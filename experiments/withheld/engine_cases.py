@@ -147,10 +147,16 @@ def simulate_case(case: dict) -> list[np.ndarray]:
             "noise": case["noise"] if real else None,
             "effects": {},
             "rng": np.random.default_rng([case["seed"], 3, number]),
+            "start": [*rng.uniform(-0.3, 0.3, 2), rng.uniform(-np.pi, np.pi)],
+            "slip": robots.slip_series(rng, case["slip"] if real else None, ROWS, case["period"]),
+            "session_time": case["session"] / RUNS * number if real else 0.0,
         }
-        start = [*rng.uniform(-0.3, 0.3, 2), rng.uniform(-np.pi, np.pi)]
-        shove = robots.slip_series(rng, case["slip"] if real else None, ROWS, case["period"])
-        session_time = case["session"] / RUNS * number if real else 0.0
-        poses = simulate(*robot_of(case, real), case["period"], run["u"], start, session_time, shove)
-        logs.append(as_log(run, poses))
+        logs.append(drive_run(case, run, changed=real))
     return logs
+
+
+def drive_run(case: dict, run: dict, changed: bool = True) -> np.ndarray:
+    """The log (rows, 6) of one run of the robot of a case."""
+    body, driver = robot_of(case, changed)
+    poses = simulate(body, driver, run["period"], run["u"], run["start"], run["session_time"], run["slip"])
+    return as_log(run, poses)
