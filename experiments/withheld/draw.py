@@ -17,7 +17,8 @@ def draw(names: list[str], seed: int, out: pathlib.Path, answers: pathlib.Path) 
             for number, logs in enumerate(simulate_block(part), start=done + 1):
                 write_case(out / f"case_{number:03d}", logs)
             done += len(part)
-            print(f"{done} of {sum(map(len, sets))} cases in {time.monotonic() - begin:.0f} s", flush=True)
+            spent, total = time.monotonic() - begin, sum(map(len, sets))
+            print(f"{done} of {total} cases in {spent:.0f} s; in all about {spent / done * total:.0f} s", flush=True)
     everything = [case for cases in sets for case in cases]
     write_answers(answers, {f"case_{k:03d}": case for k, case in enumerate(everything, start=1)})
     print(f"wrote {answers}")

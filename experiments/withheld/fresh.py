@@ -18,15 +18,15 @@ SMALLEST = 0.01
 """Of the nominal error, in camera variances: below it there is nothing to shrink."""
 
 
-def fresh_runs(answer: dict) -> list[tuple[Log, float]]:
+def fresh_runs(answer: dict, count: int = RUNS) -> list[tuple[Log, float]]:
     """Runs (log, session time) of the hidden robot that no diagnosis has seen."""
     rng, runs = np.random.default_rng([answer["seed"], 4]), []
-    for number in range(RUNS):
+    for number in range(count):
         runs.append({
             "robot": answer["robot"], "effects": hidden(answer) if answer["generator"] == "batch" else {},
             "period": answer["period"], "u": robots.draw_commands(rng, ROWS), "noise": None, "rng": None,
             "start": [*rng.uniform(-0.3, 0.3, 2), rng.uniform(-np.pi, np.pi)], "slip": np.zeros((ROWS, 2)),
-            "session_time": (number + 0.5) / RUNS * answer["session"],
+            "session_time": (number + 0.5) / count * answer["session"],
         })  # fmt: skip
     if answer["generator"] == "batch":
         logs = simulate_runs(runs)

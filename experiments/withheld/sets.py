@@ -8,6 +8,7 @@ from .cases import describe, simulate_cases
 from .robots import OUTSIDE_SITES
 
 COUNTS = {
+    "trial": {"none": 1, "single": 1, "pair": 1, "outside": 1},
     "development": {"none": 20, "single": 40},
     "development_pairs": {"pair": 15, "outside": 15},
     "sealed": {"none": 80, "single": 145, "pair": 40, "outside": 40},

@@ -13,7 +13,7 @@ ROBOT = {
     "coupling": np.array([0.002, -0.3]),
     "dead_zone": np.array([0.12, 0.09]),
 }
-PERIOD, ROWS = 0.04, 61
+PERIOD, ROWS = 0.04, 41
 START = np.array([0.1, -0.2, 0.5])
 CERTAIN = [name for name, entry in CATALOGUE.items() if not entry.random]
 SETS = [(), *((name,) for name in CERTAIN), ("payload_change", "stiction", "backlash", "motor_lag", "transport_delay")]

@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from support.withheld_cases import model_of
 from withheld import cases, seal
 from withheld.diagnose import diagnose
 from withheld.fresh import fresh_runs, local_motion, true_shrink
@@ -13,8 +14,6 @@ from withheld.judge import judge
 from withheld.score import calibration_error, table
 
 import jaxident as ji
-from jaxident.robot.drive import Physical
-from jaxident.robot.model import Effect, Model
 
 
 def test_wilson_by_hand():
@@ -71,17 +70,11 @@ def test_a_sealed_answer_opens_with_its_key_only(tmp_path):
         seal.unseal(tmp_path / "sealed", key)
 
 
-def model_of(case, effects=True):
-    robot = case["robot"]
-    drive = Physical(np.array(robot["rate"]), np.array(robot["gain"]), np.array(robot["coupling"]))
-    own = tuple(Effect(e["name"], e["parameters"]) for e in case["effects"]) if effects else ()
-    return Model(case["period"], drive, np.array(robot["dead_zone"]), effects=own)
-
-
+@pytest.mark.slow
 def test_the_true_model_shrinks_the_gap_to_nothing():
     """Both simulators under the same effects, from reported poses that the marker has moved."""
     case = cases.describe(3, "single", ["marker_offset", "motor_lag", "payload_change"], slip=True, sim=None)
-    runs = fresh_runs(case)[::5]
+    runs = fresh_runs(case, count=2)
     found = true_shrink(case, model_of(case, effects=False), model_of(case), 1.0, runs)
     assert found["before"] > 1.0
     assert found["shrink"] > 0.999
