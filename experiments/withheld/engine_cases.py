@@ -38,11 +38,11 @@ def _slope(rng, f, body, session):
 
 def _marker(rng, f, body, session):
     angle = rng.uniform(-np.pi, np.pi)
-    return {"marker": (0.06 * f * np.cos(angle), 0.06 * f * np.sin(angle), 0.0)}, {}
+    return {"marker": (0.06 * f * np.cos(angle), 0.06 * f * np.sin(angle))}, {}
 
 
 def _turned(rng, f, body, session):
-    return {"marker": (0.0, 0.0, 0.25 * f * rng.choice([-1, 1]))}, {}
+    return {"turned": 0.25 * f * rng.choice([-1, 1])}, {}
 
 
 def _payload(rng, f, body, session):

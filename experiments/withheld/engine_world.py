@@ -29,7 +29,8 @@ class Body(NamedTuple):
     limit: float = 0.0  # of the motors' torque, that is of their current; 0 for none
     lag: float = 0.0  # time constant of the current [s]
     air: float = 0.0  # density of the medium [kg/m^3]
-    marker: tuple[float, float, float] = (0.0, 0.0, 0.0)  # ahead [m], left [m], turned [rad]
+    marker: tuple[float, float] = (0.0, 0.0)  # ahead, left
+    turned: float = 0.0  # the marker [rad]
 
 
 def world(body: Body) -> str:
@@ -47,7 +48,7 @@ def world(body: Body) -> str:
         for x in (-0.07, 0.07)
     )
     inertia = body.mass * body.gyration**2
-    ahead, left, turned = body.marker
+    ahead, left = body.marker
     return f"""<mujoco>
  <option timestep="{TIMESTEP}" integrator="implicitfast" cone="elliptic" impratio="100" noslip_iterations="4"
   density="{body.air}" gravity="{gravity}"/>
@@ -56,7 +57,7 @@ def world(body: Body) -> str:
   <geom type="plane" size="5 5 0.1" friction="{body.grip} 0 0"/>
   <body name="chassis" pos="0 0 {body.radius}"><freejoint/>
    <inertial pos="{body.ahead} 0 0" mass="{body.mass}" diaginertia="{inertia} {inertia} {inertia}"/>
-   <site name="marker" pos="{ahead} {left} 0" euler="0 0 {57.29577951308232 * turned}"/>
+   <site name="marker" pos="{ahead} {left} 0" euler="0 0 {57.29577951308232 * body.turned}"/>
    {castors}{wheels}
   </body>
  </worldbody>

@@ -23,6 +23,7 @@ def confusion(pairs: list[tuple[str, str]], path: pathlib.Path) -> None:
     for a, b in pairs:
         counts[hidden.index(a), said.index(b)] += 1
     figure, ax = ji.plot.figure(1, 1, size=(1.5 + 0.27 * len(said), 1.5 + 0.22 * len(hidden)))
+    ax.grid(visible=False)
     ax.imshow(counts / np.maximum(counts.sum(axis=1, keepdims=True), 1), cmap="Blues", vmin=0, vmax=1, aspect="auto")
     for a, b in np.argwhere(counts > 0):
         strong = counts[a, b] > 0.5 * counts[a].sum()

@@ -16,12 +16,14 @@ WINDOW = 0.2
 
 class Regression(NamedTuple):
     """Rows are windows of the three channels, one below the other, each in units of its own spread: target (rows,),
-    nominal columns (rows, 8), and the columns of each effect. Windows `apart` rows away share no pose."""
+    nominal columns (rows, 8), and the columns of each effect. Windows `apart` rows away share no pose; run (rows,)
+    numbers the runs."""
 
     target: np.ndarray
     nominal: np.ndarray
     effects: dict[str, np.ndarray]
     apart: int
+    run: np.ndarray
 
 
 def regression(model: ji.Model, runs: list[Log]) -> Regression:
@@ -37,9 +39,10 @@ def regression(model: ji.Model, runs: list[Log]) -> Regression:
     def stacked(key):
         return np.concatenate([np.concatenate([key(part)[c] for part in parts]) * weight[c] for c in range(3)])
 
+    number = np.concatenate([np.repeat(np.arange(len(parts)), [len(part[0][c]) for part in parts]) for c in range(3)])
     apart = 2 * max(2, round(WINDOW / float(np.median(np.diff(runs[0].t)))))
     effects = {name: stacked(lambda part, name=name: part[2][name]) for name in parts[0][2]}
-    return Regression(stacked(lambda part: part[0]), stacked(lambda part: part[1]), effects, apart)
+    return Regression(stacked(lambda part: part[0]), stacked(lambda part: part[1]), effects, apart, number)
 
 
 def _one(model: ji.Model, run: Log, begin: float, span: float):

@@ -36,7 +36,7 @@ def test_late_commands_move_the_whole_path(plain):
 
 
 def test_a_marker_aside_sits_on_the_body(plain):
-    moved = run(Body(marker=(0.03, -0.02, 0.1)))
+    moved = run(Body(marker=(0.03, -0.02), turned=0.1))
     cosine, sine = np.cos(plain[:, 2]), np.sin(plain[:, 2])
     expected = plain + np.stack([0.03 * cosine + 0.02 * sine, 0.03 * sine - 0.02 * cosine, np.full(ROWS, 0.1)], axis=1)
     assert np.abs(moved - expected).max() < 1e-3  # the chassis nods a little
