@@ -78,10 +78,19 @@ def push(model, data, shove) -> None:
 
 
 def look(model, data):
-    """Pose (3,) of the marker."""
+    """Pose (3,) of the marker.
+
+    The engine moves positions with the speed at the end of its step, half a step too far: the camera takes that back,
+    or the plain robot would hear commands half a millisecond early.
+    """
+    there = data.qpos.copy()
+    mujoco.mj_integratePos(model, data.qpos, data.qvel, -0.5 * TIMESTEP)
     mujoco.mj_kinematics(model, data)
     marker, turn = data.site("marker").xpos, data.site("marker").xmat.reshape(3, 3)
-    return np.array([marker[0], marker[1], np.arctan2(turn[1, 0], turn[0, 0])])
+    seen = np.array([marker[0], marker[1], np.arctan2(turn[1, 0], turn[0, 0])])
+    data.qpos[:] = there
+    mujoco.mj_kinematics(model, data)
+    return seen
 
 
 def delayed(u: np.ndarray, steps: int, late: int) -> np.ndarray:

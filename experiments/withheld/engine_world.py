@@ -8,6 +8,10 @@ engine's world, never of the equations of the package.
 from typing import NamedTuple
 
 TIMESTEP = 1e-3
+STIFF, CLOSE = "0.002 1", "0.95 0.99 0.0005"
+GRASP = 1.8 / TIMESTEP
+"""Damping of slip at the wheels [1/s]. The engine holds them without the turning of their axes, which lets them creep
+outwards at v w (1 / damping - step / 2): little at this value, which is still stable."""
 
 
 class Body(NamedTuple):
@@ -38,9 +42,13 @@ def world(body: Body) -> str:
     g = 9.81
     gravity = f"{g * body.tilt[0]:.9g} {g * body.tilt[1]:.9g} {-g:.9g}"
     ball = 0.4 * body.radius
-    wheels, actuators, tendons = "", "", ""
+    wheels, tyres, actuators, tendons = "", "", "", ""
     for k, side in enumerate("rl"):
         wheels += _wheel(body, k, side)
+        tyres += (
+            f'<pair geom1="floor" geom2="tyre_{side}" condim="3" friction="{body.grip} {body.grip} 0 0 0" '
+            f'solref="{STIFF}" solimp="{CLOSE}" solreffriction="-1 {-GRASP}"/>'
+        )
         actuators += _motor(body, k, side)
         tendons += _gear(body, k, side)
     castors = "".join(
@@ -50,17 +58,18 @@ def world(body: Body) -> str:
     inertia = body.mass * body.gyration**2
     ahead, left = body.marker
     return f"""<mujoco>
- <option timestep="{TIMESTEP}" integrator="implicitfast" cone="elliptic" impratio="100" noslip_iterations="4"
+ <option timestep="{TIMESTEP}" integrator="implicitfast" cone="elliptic" impratio="100"
   density="{body.air}" gravity="{gravity}"/>
- <default><geom solref="0.002 1" solimp="0.95 0.99 0.0005"/></default>
+ <default><geom solref="{STIFF}" solimp="{CLOSE}"/></default>
  <worldbody>
-  <geom type="plane" size="5 5 0.1" friction="{body.grip} 0 0"/>
+  <geom name="floor" type="plane" size="5 5 0.1"/>
   <body name="chassis" pos="0 0 {body.radius}"><freejoint/>
    <inertial pos="{body.ahead} 0 0" mass="{body.mass}" diaginertia="{inertia} {inertia} {inertia}"/>
    <site name="marker" pos="{ahead} {left} 0" euler="0 0 {57.29577951308232 * body.turned}"/>
    {castors}{wheels}
   </body>
  </worldbody>
+ <contact>{tyres}</contact>
  <tendon>{tendons}</tendon>
  <actuator>{actuators}</actuator>
 </mujoco>"""
@@ -73,8 +82,8 @@ def _wheel(body: Body, k: int, side: str) -> str:
     armature = 0.0 if loose else body.rotor
     wheel = (
         f'<body pos="0 {place} 0"><joint name="hinge_{side}" axis="0 1 0" armature="{armature}" '
-        f'frictionloss="{body.dry[k]}"/><geom type="ellipsoid" size="{body.radius} 0.008 {body.radius}" '
-        f'mass="{body.wheel_mass}" friction="{body.grip} 0 0" condim="3"/></body>'
+        f'frictionloss="{body.dry[k]}"/><geom name="tyre_{side}" type="ellipsoid" mass="{body.wheel_mass}" '
+        f'size="{body.radius} 0.008 {body.radius}"/></body>'
     )
     rotor = (
         f'<body pos="0 {0.5 * place} 0"><joint name="rotor_{side}" axis="0 1 0"/>'
@@ -98,6 +107,6 @@ def _gear(body: Body, k: int, side: str) -> str:
     """Teeth: the rotor's angle stays within the play of the wheel's."""
     half = 0.5 * body.play[k]
     return (
-        f'<fixed limited="true" range="{-half} {half}" solreflimit="0.002 1">'
+        f'<fixed limited="true" range="{-half} {half}" solreflimit="{STIFF}">'
         f'<joint joint="rotor_{side}" coef="1"/><joint joint="hinge_{side}" coef="-1"/></fixed>'
     ) * (half > 0.0)
