@@ -1,0 +1,121 @@
+"""Effects injected into the poses of real logs: does the diagnosis of these against the originals name them?
+
+    python -m experiments.withheld.inject --data ../shared/data --robot create_1 --out injected
+
+writes a folder per effect, `injected/create_1/NAME/`: `real_*`, logs with the effect, and `sim_*`, untouched logs of
+the same robot for `jaxident diagnose --sim`; and beside the folders `answers.json`. Even and odd parts of a log go
+one to each, so that both share the robot and the day but no row. `none` is the pair without an effect. Only what the
+camera does to poses can be injected afterwards; camera latency is `transport_delay` seen from outside.
+"""
+
+import argparse
+import itertools
+import json
+import pathlib
+
+import numpy as np
+
+import jaxident as ji
+from jaxident.files.streams import merge, read_commands, read_poses
+from jaxident.log import Log, join
+
+CREATE_TRACK, PERIOD, PARTS = 0.258, 0.05, 12
+
+SIZES = {
+    "none": {},
+    "transport_delay": {"delay": 0.15},
+    "marker_offset": {"ahead": 0.04, "left": -0.02},
+    "heading_offset": {"offset": 0.06},
+    "camera_scale": {"difference": 0.04},
+    "outliers": {"probability": 0.02, "position": 0.1, "heading": 0.3},
+    "frozen_frames": {"probability": 0.08},
+}
+"""What is injected unless `--sizes` says otherwise; none of it is so large that the log looks broken."""
+
+
+def inject(log: Log, name: str, size: dict[str, float], rng) -> Log:
+    """One run with an effect in its poses; rows without a pose stay without one.
+
+    A delay is rounded to rows of an even log: poses come that many rows late, the first are empty.
+    """
+    x, y, theta = (np.array(column, float) for column in log.pose)
+    seen = np.isfinite(x)
+    if name == "transport_delay":
+        rows = max(1, round(size["delay"] / float(np.median(np.diff(log.t)))))
+        return log._replace(
+            **{key: late(column, rows) for key, column in zip(("x", "y", "theta"), (x, y, theta), strict=True)}
+        )
+    if name == "marker_offset":
+        cosine, sine = np.cos(theta), np.sin(theta)
+        x = x + size["ahead"] * cosine - size["left"] * sine
+        y = y + size["ahead"] * sine + size["left"] * cosine
+    elif name == "heading_offset":
+        theta = theta + size["offset"]
+    elif name == "camera_scale":
+        x, y = x * (1.0 + 0.5 * size["difference"]), y * (1.0 - 0.5 * size["difference"])
+    elif name == "outliers":
+        hit = rng.random(len(x)) < size["probability"]
+        draws = rng.normal(size=(3, len(x))) * hit
+        x, y = x + size["position"] * draws[0], y + size["position"] * draws[1]
+        theta = theta + size["heading"] * draws[2]
+    elif name == "frozen_frames":
+        x, y, theta = frozen(np.flatnonzero(seen), size["probability"], rng, x, y, theta)
+    return log._replace(x=x, y=y, theta=np.mod(theta + np.pi, 2.0 * np.pi) - np.pi)
+
+
+def late(column: np.ndarray, rows: int) -> np.ndarray:
+    """The column `rows` later, NaN before."""
+    return np.concatenate([np.full(rows, np.nan), column])[: len(column)]
+
+
+def frozen(places: np.ndarray, probability: float, rng, *columns: np.ndarray) -> list[np.ndarray]:
+    """Columns in which a pose is, with this probability, that of the frame before, which may be frozen itself."""
+    kept = np.where(rng.random(len(places)) < probability, 0, np.arange(len(places)))
+    source = places[np.maximum.accumulate(kept)]
+    copies = [column.copy() for column in columns]
+    for copy, column in zip(copies, columns, strict=True):
+        copy[places] = column[source]
+    return copies
+
+
+def read_robot(data: pathlib.Path, robot: str) -> list[Log]:
+    """The runs of one robot: create_1 .. create_5, each log cut into PARTS, or husky, its windows."""
+    if robot == "husky":
+        return ji.read_log(data / "drive_husky" / "husky.csv.gz").runs()
+    stem = data / "mrclam" / f"D6_R{int(robot.removeprefix('create_'))}"
+    streams = read_commands(f"{stem}_commands.csv.gz"), read_poses(f"{stem}_poses.csv.gz")
+    log = merge(*streams, track=CREATE_TRACK, period=PERIOD)
+    cuts = np.linspace(0, len(log.t), PARTS + 1).astype(int)
+    return [log.rows(first, last) for first, last in itertools.pairwise(cuts)]
+
+
+def write_pair(runs: list[Log], name: str, size: dict[str, float], folder: pathlib.Path, seed: int) -> None:
+    """Even runs with the effect as real_1, odd ones untouched as sim_1; several runs to a file where they are many."""
+    folder.mkdir(parents=True, exist_ok=True)
+    rng = np.random.default_rng([seed, *name.encode()])
+    for label, part in (("real", [inject(run, name, size, rng) for run in runs[::2]]), ("sim", runs[1::2])):
+        groups = [part] if len(part) > PARTS else [[run] for run in part]
+        for number, group in enumerate(groups, start=1):
+            ji.write_log(join(group), folder / f"{label}_{number}.csv.gz")
+
+
+def main() -> None:
+    """Write every injection of a robot."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=pathlib.Path, required=True)
+    parser.add_argument("--robot", default="create_1", help="create_1 to create_5, or husky")
+    parser.add_argument("--out", type=pathlib.Path, required=True)
+    parser.add_argument("--sizes", type=json.loads, default={}, help='such as {"heading_offset": {"offset": 0.02}}')
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    runs, sizes = read_robot(options.data, options.robot), SIZES | options.sizes
+    folder = options.out / options.robot
+    for name, size in sizes.items():
+        write_pair(runs, name, size, folder / name, options.seed)
+        print(f"wrote {folder / name}")
+    (folder / "answers.json").write_text(json.dumps(sizes, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    ji.start_jax()
+    main()

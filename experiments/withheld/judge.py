@@ -1,0 +1,75 @@
+"""Score a folder of diagnoses against unsealed answers, and write table and pictures."""
+
+import json
+import pathlib
+from typing import Any
+
+import numpy as np
+
+import jaxident as ji
+
+from . import picture
+from .fresh import fresh_runs, true_shrink
+from .marks import mark
+from .score import table
+
+RANDOM = ("coloured_noise", "outliers", "frozen_frames", "lost_commands")
+"""Effects that leave nothing to shrink on runs without chance."""
+
+
+def judge(answers: dict[str, dict], folders: dict[str, pathlib.Path], out: pathlib.Path, shrink: bool = True) -> dict:
+    """Tables by generator and method; folders: that of each method's diagnoses. Writes OUT/scores.json, table.md and
+    pictures."""
+    out.mkdir(parents=True, exist_ok=True)
+    marks = {
+        method: {name: one(answer, folder / name, shrink) for name, answer in answers.items()}
+        for method, folder in folders.items()
+    }
+    kinds = sorted({answer["generator"] for answer in answers.values()})
+    tables, pages = {}, []
+    for kind in kinds:
+        own = {name: answer for name, answer in answers.items() if answer["generator"] == kind}
+        tables[kind] = {method: table([found[name] for name in own]) for method, found in marks.items()}
+        pages.append(f"## {len(own)} cases of the {kind} robot\n\n{picture.text(tables[kind])}")
+        for method, found in marks.items():
+            draw(own, {name: found[name] for name in own}, out, f"{kind}_{method}")
+    (out / "scores.json").write_text(json.dumps({"tables": tables, "marks": marks}, indent=1) + "\n")
+    (out / "table.md").write_text("\n".join(pages))
+    print("\n".join(pages))
+    return tables
+
+
+def one(answer: dict, folder: pathlib.Path, shrink: bool) -> dict[str, Any]:
+    """The marks of one case; a case without a diagnosis is marked as failed."""
+    path, record = folder / "diagnosis.json", folder / "process.json"
+    diagnosis = json.loads(path.read_text()) if path.exists() else None
+    found = mark(answer, diagnosis) | {"strength": answer["strength"], "inputs": answer["inputs"]}
+    found["seconds"] = json.loads(record.read_text())["seconds"] if record.exists() else None
+    gap = (diagnosis or {}).get("gap") or {}
+    found["interval"] = gap.get("shrink_interval")
+    if shrink and diagnosis and listed(answer) and (folder / "corrected_model.json").exists():
+        models = [ji.load_model(folder / f"{name}_model.json") for name in ("nominal", "corrected")]
+        found["shrink"] = true_shrink(answer, *models, gap["horizon"], fresh_runs(answer))["shrink"]
+    return found
+
+
+def listed(answer: dict) -> bool:
+    """Whether the shrink of a case has meaning: effects of the catalogue that are there without chance."""
+    names = [effect["name"] for effect in answer["effects"]]
+    return answer["kind"] in ("single", "pair") and not any(name in RANDOM for name in names)
+
+
+def draw(answers: dict[str, dict], marks: dict[str, dict], out: pathlib.Path, label: str) -> None:
+    """Confusion matrix over cases with at most one effect, and the reliability of the probabilities."""
+    hidden = {
+        name: (answer["effects"] or [{"name": "none"}])[0]["name"]
+        for name, answer in answers.items()
+        if len(answer["effects"]) < 2
+    }
+    if hidden:
+        picture.confusion(
+            [(hidden[name], picture.said(marks[name])) for name in hidden], out / f"confusion_{label}.png"
+        )
+    tops = [m["top"] for m in marks.values() if m["top"] is not None]
+    if tops:
+        picture.reliable(np.array(tops, float), out / f"reliability_{label}.png")

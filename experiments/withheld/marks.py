@@ -1,0 +1,97 @@
+"""Marks of one diagnosis against the answer: what is right and what is not, each true, false or null."""
+
+import itertools
+from typing import Any
+
+GAP_VERDICTS = ("effects", "unknown")
+
+
+def mark(answer: dict, diagnosis: dict | None) -> dict[str, Any]:
+    """All marks of a case; a diagnosis that is missing (the process failed) is wrong wherever it counts.
+
+    claimed: a gap beyond parameters is claimed. right: the hidden set is named, no more and no less, where a name also
+    stands for those said to be indistinguishable from it. strict: the same without them. some: at least one hidden
+    effect is named. site, channel: the most probable site, the channel of most excess, are among the right ones.
+    top: probability of the most probable of none, unknown and the sets, and whether that is the truth.
+    """
+    if diagnosis is None:
+        diagnosis = {"verdict": "failed"}
+    selected, likeness = diagnosis.get("selected") or [], look_alikes(diagnosis)
+    kind, accepted = answer["kind"], answer["accepted"]
+    listed = kind in ("single", "pair")
+    effects = diagnosis["verdict"] == "effects"
+    alike = [{name, *likeness.get(name, ())} for name in selected]
+    return {
+        "kind": kind,
+        "verdict": diagnosis["verdict"],
+        "claimed": diagnosis["verdict"] in GAP_VERDICTS,
+        "unknown": diagnosis["verdict"] == "unknown",
+        "selected": selected,
+        "right": bool(effects and covers(accepted, alike)) if listed else None,
+        "strict": bool(effects and covers(accepted, [{name} for name in selected])) if listed else None,
+        "some": bool(effects and any(set(names) & each for names in accepted for each in alike)) if listed else None,
+        "extra": bool(effects and any(not touches(accepted, each) for each in alike)) if listed else None,
+        "set_size": max(map(len, alike), default=0),
+        "site": _among(_largest(diagnosis, "site"), [s for e in answer["effects"] for s in e["sites"]]),
+        "channel": _among(_largest(diagnosis, "channels"), answer["channels"]),
+        "top": top(answer, diagnosis, likeness),
+        "probability_of_truth": probability_of_truth(answer, diagnosis, likeness),
+    }
+
+
+def look_alikes(diagnosis: dict) -> dict[str, list[str]]:
+    """For each cause the names that this input cannot tell from it."""
+    return {cause["effect"]: cause.get("indistinguishable_from") or [] for cause in diagnosis.get("causes") or []}
+
+
+def touches(accepted: list[list[str]], names: set[str]) -> bool:
+    """Whether one of the names is right for one of the hidden effects."""
+    return any(set(right) & names for right in accepted)
+
+
+def covers(accepted: list[list[str]], found: list[set[str]]) -> bool:
+    """Whether each hidden effect is found by a name of its own, nothing else is, and no more than can be right."""
+    if not found or len(found) > sum(map(len, accepted)):
+        return False
+    each_by_one = any(
+        all(set(right) & names for right, names in zip(accepted, chosen, strict=True))
+        for chosen in itertools.permutations(found, len(accepted))
+    )
+    return each_by_one and all(touches(accepted, names) for names in found)
+
+
+def hypotheses(answer: dict, diagnosis: dict, likeness: dict) -> list[tuple[float, bool]]:
+    """Probability of each hypothesis of the diagnosis, and whether it is the truth."""
+    given = diagnosis.get("probability") or {}
+    rows = [
+        (given.get("none", 0.0), answer["kind"] == "none"),
+        (given.get("unknown", 0.0), answer["kind"] == "outside"),
+    ]
+    for each in given.get("sets") or []:
+        alike = [{name, *likeness.get(name, ())} for name in each["effects"]]
+        rows.append((each["p"], bool(answer["accepted"]) and covers(answer["accepted"], alike)))
+    return rows
+
+
+def top(answer: dict, diagnosis: dict, likeness: dict) -> tuple[float, bool] | None:
+    """The most probable hypothesis."""
+    rows = hypotheses(answer, diagnosis, likeness)
+    return max(rows) if diagnosis.get("probability") else None
+
+
+def probability_of_truth(answer: dict, diagnosis: dict, likeness: dict) -> float | None:
+    """What the diagnosis gives to the truth in all."""
+    if not diagnosis.get("probability"):
+        return None
+    return sum(p for p, true in hypotheses(answer, diagnosis, likeness) if true)
+
+
+def _largest(diagnosis: dict, key: str) -> str | None:
+    shares = (diagnosis.get("where") or {}).get(key) or {}
+    known = {name: share for name, share in shares.items() if share is not None}
+    return max(known, key=known.__getitem__) if known else None
+
+
+def _among(found: str | None, right: list[str]) -> bool | None:
+    """Null where nothing can be right; not finding anything is wrong."""
+    return None if not right else found in right

@@ -1,0 +1,73 @@
+"""Sets of cases, each from one seed."""
+
+import numpy as np
+
+from jaxident.effects import CATALOGUE
+
+from .cases import describe, simulate_cases
+from .robots import OUTSIDE_SITES
+
+COUNTS = {
+    "trial": {"none": 1, "single": 1, "pair": 1, "outside": 1},
+    "development": {"none": 20, "single": 40},
+    "development_pairs": {"pair": 15, "outside": 15},
+    "sealed": {"none": 80, "single": 145, "pair": 40, "outside": 40},
+    "engine": {"none": 5, "single": 15},
+    "sealed_engine": {"none": 20, "single": 60, "pair": 20},
+}
+"""Cases of each kind in each set; those of the engine need the extra `mujoco`."""
+
+FORWARD = 0.06
+"""Share of sealed cases whose input is two forward levels."""
+
+
+def draw_set(name: str, seed: int) -> list[dict]:
+    """Descriptions of all cases of a set, in random order."""
+    rng = np.random.default_rng(seed)
+    cases = _engine_cases(rng, name) if "engine" in name else _batch_cases(rng, name)
+    return [cases[k] for k in rng.permutation(len(cases))]
+
+
+def simulate_block(cases: list[dict]) -> list[list[np.ndarray]]:
+    """The logs of each case, all of one generator."""
+    if cases[0]["generator"] == "batch":
+        return simulate_cases(cases)
+    from .engine_cases import simulate_case
+
+    return [simulate_case(case) for case in cases]
+
+
+def _engine_cases(rng, name: str) -> list[dict]:
+    from . import engine_cases
+
+    cases = []
+    for kind, count in COUNTS[name].items():
+        for number, names in enumerate(hidden_names(rng, kind, count, list(engine_cases.LAWS))):
+            slip = number % 2 == 1 if kind == "none" else rng.random() < 0.3
+            sim = bool(rng.random() < 0.5)
+            cases.append(engine_cases.describe(int(rng.integers(2**62)), names, slip=bool(slip), sim=sim))
+    return cases
+
+
+def _batch_cases(rng, name: str) -> list[dict]:
+    cases = []
+    for kind, count in COUNTS[name].items():
+        pool = list(OUTSIDE_SITES) if kind == "outside" else list(CATALOGUE)
+        for number, names in enumerate(hidden_names(rng, kind, count, pool)):
+            sim = rng.choice(["same", "near"]) if rng.random() < 1 / 3 else None
+            slip = number % 2 == 1 if kind == "none" else rng.random() < 0.5
+            forward = name == "sealed" and rng.random() < FORWARD
+            inputs = "forward" if forward else "multilevel"
+            own = int(rng.integers(2**62))
+            cases.append(describe(own, kind, names, slip=bool(slip), sim=sim, inputs=inputs))
+    return cases
+
+
+def hidden_names(rng, kind: str, count: int, pool: list[str]) -> list[list[str]]:
+    """Names of the hidden effects of each case: every effect as often as any other, up to one."""
+    if kind == "none":
+        return [[] for _ in range(count)]
+    if kind == "pair":
+        return [rng.choice(pool, 2, replace=False).tolist() for _ in range(count)]
+    drawn = np.concatenate([rng.permutation(pool) for _ in range(-(-count // len(pool)))])
+    return [[str(name)] for name in drawn[:count]]

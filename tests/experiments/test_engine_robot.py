@@ -1,0 +1,59 @@
+"""The engine's robot: what must hold exactly whatever the engine does within a step."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mujoco")
+
+from withheld import engine_cases, robots
+from withheld.engine_robot import Driver, simulate
+from withheld.engine_world import Body
+
+PERIOD, ROWS, START = 0.02, 61, (0.1, -0.2, 0.7)
+COMMANDS = robots.draw_commands(np.random.default_rng(3), ROWS)
+COMMANDS[:8] = 0.8, 0.5
+
+
+def run(body=None, driver=None, **options):
+    return simulate(body or Body(), driver or Driver(), PERIOD, COMMANDS, START, **options)
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return run()
+
+
+def test_it_drives_forward_and_turns_left_at_more_on_the_right(plain):
+    assert np.allclose(plain[0], START, atol=1e-6)
+    ahead = (plain[8, :2] - plain[0, :2]) @ [np.cos(0.7), np.sin(0.7)]
+    assert ahead > 1e-3
+    assert plain[8, 2] > plain[0, 2]
+
+
+def test_late_commands_move_the_whole_path(plain):
+    late = run(driver=Driver(delay=2 * PERIOD))
+    assert np.abs(late[2:] - plain[:-2]).max() < 1e-6
+
+
+def test_a_marker_aside_sits_on_the_body(plain):
+    moved = run(Body(marker=(0.03, -0.02), turned=0.1))
+    cosine, sine = np.cos(plain[:, 2]), np.sin(plain[:, 2])
+    expected = plain + np.stack([0.03 * cosine + 0.02 * sine, 0.03 * sine - 0.02 * cosine, np.full(ROWS, 0.1)], axis=1)
+    assert np.abs(moved - expected).max() < 1e-3  # the chassis nods a little
+
+
+def test_a_payload_counts_from_its_instant_on(plain):
+    later = run(driver=Driver(payload=2.0, instant=10.0 + 30 * PERIOD), session_time=10.0)
+    assert np.array_equal(later[:31], plain[:31])
+    assert np.abs(later[-1] - plain[-1]).max() > 1e-3
+
+
+@pytest.mark.parametrize("name", list(engine_cases.LAWS))
+def test_every_hidden_effect_moves_the_robot(name):
+    case = engine_cases.describe(7, [name], slip=False, sim=False)
+    draws = {"period": PERIOD, "u": COMMANDS, "start": START, "session_time": 0.9 * case["session"], "slip": None}
+    logs = [
+        engine_cases.drive_run(case, draws | {"noise": None, "effects": {}, "rng": None}, changed=changed)
+        for changed in (False, True)
+    ]
+    assert np.nanmax(np.abs(logs[1] - logs[0])[:, 3:]) > 1e-4

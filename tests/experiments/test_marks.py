@@ -1,0 +1,103 @@
+"""Marks of hand-written diagnoses."""
+
+import pytest
+from withheld.marks import mark
+
+BATCH = {"generator": "batch", "strength": [0.3], "inputs": "multilevel"}
+NONE = BATCH | {"kind": "none", "effects": [], "accepted": [], "channels": []}
+DELAY = BATCH | {
+    "kind": "single",
+    "effects": [{"name": "transport_delay", "parameters": {"delay": 0.03}, "sites": ["actuation"]}],
+    "accepted": [["transport_delay"]],
+    "channels": ["along", "heading"],
+}
+GRIP = DELAY | {
+    "effects": [{"name": "low_grip", "parameters": {}, "sites": ["contact"]}],
+    "accepted": [["traction_limit", "lateral_slip"]],
+}
+PAIR = DELAY | {
+    "kind": "pair",
+    "effects": [*DELAY["effects"], {"name": "slope", "parameters": {}, "sites": ["contact"]}],
+    "accepted": [["transport_delay"], ["slope"]],
+}
+OUTSIDE = DELAY | {
+    "kind": "outside",
+    "effects": [{"name": "tether", "parameters": {}, "sites": ["drive", "contact"]}],
+    "accepted": [],
+    "channels": [],
+}
+
+
+def says(*selected, verdict="effects", alike=None, p=0.9, site="actuation", channel="along"):
+    """A diagnosis as `jaxident diagnose` writes it."""
+    sets = [{"effects": list(selected), "p": p}] if selected else []
+    rest = 1.0 - (p if selected else 0.0)
+    return {
+        "schema": "jaxident.diagnosis/1",
+        "verdict": verdict,
+        "probability": {"none": rest, "unknown": 0.0, "sets": sets},
+        "selected": list(selected),
+        "causes": [{"effect": name, "indistinguishable_from": (alike or {}).get(name, [])} for name in selected],
+        "where": {"site": {site: 0.8, "camera": 0.1}, "channels": {channel: 0.7, "lateral": None}},
+    }
+
+
+@pytest.mark.parametrize(
+    ("answer", "diagnosis", "right", "strict", "some", "extra"),
+    [
+        (DELAY, says("transport_delay"), True, True, True, False),
+        (DELAY, says("motor_lag"), False, False, False, True),
+        (DELAY, says("motor_lag", alike={"motor_lag": ["transport_delay"]}), True, False, True, False),
+        (DELAY, says("transport_delay", "slope"), False, False, True, True),
+        (DELAY, says("transport_delay", verdict="undecided"), False, False, False, False),
+        (DELAY, says(verdict="no_gap"), False, False, False, False),
+        (DELAY, None, False, False, False, False),
+        (PAIR, says("slope", "transport_delay"), True, True, True, False),
+        (PAIR, says("slope"), False, False, True, False),
+        (PAIR, says("slope", "motor_lag", alike={"motor_lag": ["transport_delay"]}), True, False, True, False),
+        (PAIR, says("slope", "backlash"), False, False, True, True),
+        (GRIP, says("lateral_slip"), True, True, True, False),
+        (GRIP, says("lateral_slip", "traction_limit"), True, True, True, False),
+        (GRIP, says("slope"), False, False, False, True),
+    ],
+)
+def test_naming(answer, diagnosis, right, strict, some, extra):
+    found = mark(answer, diagnosis)
+    assert (found["right"], found["strict"], found["some"], found["extra"]) == (right, strict, some, extra)
+
+
+def test_one_name_for_two_effects_is_not_both():
+    alike = {"motor_lag": ["transport_delay", "slope"]}
+    assert not mark(PAIR, says("motor_lag", alike=alike))["right"]
+
+
+@pytest.mark.parametrize("verdict", ["effects", "unknown", "no_gap", "parameters", "undecided"])
+def test_only_effects_and_unknown_claim_a_gap(verdict):
+    assert mark(NONE, says(verdict=verdict))["claimed"] is (verdict in ("effects", "unknown"))
+    assert mark(NONE, says(verdict=verdict))["right"] is None
+
+
+def test_site_and_channel():
+    found = mark(DELAY, says("transport_delay"))
+    assert found["site"] is True
+    assert found["channel"] is True
+    assert mark(DELAY, says("transport_delay", site="contact"))["site"] is False
+    assert mark(DELAY, says("x", site="contact", channel="lateral"))["channel"] is False
+    assert mark(DELAY, None)["site"] is False
+    assert mark(NONE, says())["site"] is None
+    assert mark(OUTSIDE, says(verdict="unknown", site="drive"))["site"] is True
+    assert mark(OUTSIDE, says(verdict="unknown"))["channel"] is None
+
+
+def test_probabilities():
+    assert mark(DELAY, says("transport_delay", p=0.7))["top"] == (0.7, True)
+    assert mark(DELAY, says("slope", p=0.7))["probability_of_truth"] == 0.0
+    assert mark(NONE, says())["top"] == (1.0, True)
+    assert mark(NONE, None)["top"] is None
+    outside = says(verdict="unknown") | {"probability": {"none": 0.2, "unknown": 0.8, "sets": []}}
+    assert mark(OUTSIDE, outside)["top"] == (0.8, True)
+    assert mark(OUTSIDE, outside)["unknown"]
+    sets = [{"effects": ["motor_lag"], "p": 0.5}, {"effects": ["transport_delay"], "p": 0.4}]
+    both = says("motor_lag") | {"probability": {"none": 0.1, "unknown": 0.0, "sets": sets}}
+    assert mark(DELAY, both)["top"] == (0.5, False)
+    assert mark(DELAY, both)["probability_of_truth"] == pytest.approx(0.4)

@@ -1,0 +1,125 @@
+"""Tables from marks, intervals, the seal, and the shrink on fresh runs."""
+
+import json
+import sys
+
+import numpy as np
+import pytest
+from support.withheld_cases import model_of
+from withheld import cases, seal
+from withheld.diagnose import diagnose
+from withheld.fresh import fresh_runs, local_motion, true_shrink
+from withheld.intervals import bootstrap, wilson
+from withheld.judge import judge
+from withheld.score import calibration_error, table
+
+import jaxident as ji
+
+
+def test_wilson_by_hand():
+    """Newcombe 1998, table I: 81 of 263."""
+    assert wilson(81, 263) == pytest.approx((0.2553, 0.3662), abs=1e-4)
+    assert wilson(0, 20)[0] == 0.0
+    assert wilson(0, 0) == (0.0, 1.0)
+
+
+def test_bootstrap_of_a_mean():
+    values = np.random.default_rng(0).normal(size=400)
+    low, high = bootstrap(values, np.mean)
+    assert (high - low) / 2 == pytest.approx(1.96 / 20, rel=0.1)
+
+
+def test_calibration_error():
+    tops = np.array([[0.95, 1]] * 9 + [[0.95, 0]] + [[0.55, 0]] * 10, float)
+    assert calibration_error(tops) == pytest.approx(0.5 * 0.05 + 0.5 * 0.55)
+
+
+def marks(kind, count, **more):
+    base = {
+        "kind": kind, "verdict": "effects", "claimed": True, "unknown": False, "right": True, "strict": True,
+        "some": True, "extra": False, "site": True, "channel": None, "top": (0.8, True), "probability_of_truth": 0.8,
+        "strength": [0.5], "selected": ["slope"],
+    }  # fmt: skip
+    return [base | more for _ in range(count)]
+
+
+def test_table():
+    given = marks("none", 20, claimed=False) + marks("none", 1) + marks("single", 9, shrink=0.9, interval=[0.8, 1.0])
+    given += marks("single", 1, right=False, shrink=0.5, interval=[0.6, 0.7]) + marks("outside", 4, unknown=True)
+    rows = {row["row"]: row for row in table(given)}
+    assert rows["effect claimed when there is none"]["value"] == pytest.approx(1 / 21)
+    assert rows["one effect: named"]["value"] == pytest.approx(0.9)
+    assert rows["one effect: named"]["interval"] == pytest.approx(wilson(9, 10))
+    assert rows["outside the catalogue: unknown"]["value"] == 1.0
+    assert rows["two effects: both named"]["value"] is None
+    assert rows["shrink achieved over achievable, median"]["value"] == pytest.approx(0.9)
+    assert rows["shrink inside its 90 % interval"]["value"] == pytest.approx(0.9)
+    assert rows["first hypothesis: probability less share right"]["value"] == pytest.approx(-0.2)
+
+
+def test_a_sealed_answer_opens_with_its_key_only(tmp_path):
+    plain, key = tmp_path / "answers.json", tmp_path / "key"
+    plain.write_text('{"case_001": "slope"}')
+    digest = seal.seal(plain, tmp_path / "sealed", key)
+    assert not plain.exists()
+    assert b"slope" not in (tmp_path / "sealed" / "answers.sealed").read_bytes()
+    assert (tmp_path / "sealed" / "SEAL").read_text().startswith(digest)
+    assert json.loads(seal.unseal(tmp_path / "sealed", key)) == {"case_001": "slope"}
+    key.write_bytes(bytes(32))
+    with pytest.raises(ValueError, match="not this key"):
+        seal.unseal(tmp_path / "sealed", key)
+
+
+@pytest.mark.slow
+def test_the_true_model_shrinks_the_gap_to_nothing():
+    """Both simulators under the same effects, from reported poses that the marker has moved."""
+    case = cases.describe(3, "single", ["marker_offset", "motor_lag", "payload_change"], slip=True, sim=None)
+    runs = fresh_runs(case, count=2)
+    found = true_shrink(case, model_of(case, effects=False), model_of(case), 1.0, runs)
+    assert found["before"] > 1.0
+    assert found["shrink"] > 0.999
+
+
+def test_local_motion_is_in_the_frame_of_its_start():
+    pose = np.array([[1.0, 2.0, np.pi / 2], [1.0, 3.0, 3.1], [0.0, 3.0, -3.1]])
+    assert local_motion(pose, 2) == pytest.approx(np.array([[1.0, 1.0, 2 * np.pi - 3.1 - np.pi / 2]]))
+
+
+def test_diagnoses_are_run_and_judged(tmp_path):
+    """A program that always says `slope`, and fails on the second case."""
+    answers = {
+        "case_1": cases.describe(1, "single", ["slope"], slip=False, sim=None),
+        "case_2": cases.describe(2, "none", [], slip=False, sim=None),
+    }
+    for name in answers:
+        (tmp_path / "cases" / name).mkdir(parents=True)
+    program = tmp_path / "program.py"
+    program.write_text(
+        "import json, sys, pathlib\n"
+        "if sys.argv[1].endswith('2'): sys.exit('no')\n"
+        "said = {'verdict': 'effects', 'selected': ['slope'], 'causes': [], 'probability': None}\n"
+        "pathlib.Path(sys.argv[2], 'diagnosis.json').write_text(json.dumps(said))\n"
+    )
+    command = f"{sys.executable} {program} {{case}} {{out}}"
+    for _ in range(2):
+        done = diagnose(tmp_path / "cases", tmp_path / "found", command, jobs=2)
+    assert [each["exit_code"] for each in done] == [0, 1]
+    tables = judge(answers, {"slope": tmp_path / "found"}, tmp_path / "scores")
+    rows = {row["row"]: row["value"] for row in tables["batch"]["slope"]}
+    assert rows["one effect: named"] == 1.0
+    assert rows["failed"] == 0.5
+    assert (tmp_path / "scores" / "confusion_batch_slope.png").exists()
+    assert "one effect: named" in (tmp_path / "scores" / "table.md").read_text()
+
+
+def test_a_case_written_is_a_log_of_the_package(tmp_path):
+    case = cases.describe(5, "single", ["frozen_frames"], slip=True, sim="near")
+    runs = [run | {key: run[key][:40] for key in ("u", "slip")} for run in cases.plan(case)]
+    logs = cases.simulate_runs(runs)
+    cases.write_case(tmp_path, logs)
+    assert sorted(path.name for path in tmp_path.iterdir())[:2] == ["real_1.csv.gz", "real_2.csv.gz"]
+    assert len(list(tmp_path.glob("sim_*"))) == cases.SIM_RUNS
+    log = ji.read_log(tmp_path / "real_2.csv.gz")
+    assert np.asarray(log.x) == pytest.approx(logs[1][:, 3], abs=1e-6)
+    again = cases.simulate_runs([run | {key: run[key][:40] for key in ("u", "slip")} for run in cases.plan(case)])
+    assert np.array_equal(again[1], logs[1], equal_nan=True)
