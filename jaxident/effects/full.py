@@ -57,19 +57,45 @@ def run_full(
     of them, makes one program for every set; a program of few effects compiles and runs several times faster, and one
     without friction, play, lag and the like takes no substeps.
     """
-    settings = {name: values for name, values in by_name(vector).items() if name in parts}
-    keys = None if key is None else jax.random.split(jax.random.fold_in(key, 1), 5)
-    unit = None if key is None else draw_noise(key, len(t))
-    sent = _sent(settings, command, None if keys is None else keys[0])
+    pose = run_undisturbed(drive, dead_zone, vector, t, command, start, noise=noise, key=key, session_time=session_time,
+                           substeps=substeps, parts=parts)  # fmt: skip
+    return pose if key is None else disturb(pose, vector, t, noise=noise, key=key, parts=parts)
+
+
+def run_undisturbed(
+    drive, dead_zone, vector, t, command: Wheels, start: State, *, noise, key, session_time=0.0, substeps, parts
+) -> Pose:
+    """`run_full` before `disturb`: poses (samples,) as the camera would report them if it made no random error."""
+    settings = _settings(vector, parts)
+    sent = _sent(settings, command, None if key is None else _keys(key)[0])
     grid = _grid(settings, t, sent, session_time, substeps)
     push_aside = None
-    if unit is not None and noise is not None:
-        push_aside = Force(*(f[grid.row] for f in slip(noise, unit, jnp.append(jnp.diff(t), 1.0))))
+    if key is not None and noise is not None:
+        drawn = slip(noise, draw_noise(key, len(t)), jnp.append(jnp.diff(t), 1.0))
+        push_aside = Force(*(f[grid.row] for f in drawn))
     states = _scan(settings, drive, dead_zone, grid, push_aside, start, session_time - t[0])
-    pose = _optics(settings, Pose(*(column[grid.at_row] for column in states.pose)))
-    if unit is not None and noise is not None:
-        pose = observe(pose, noise, unit, jnp.diff(t))
-    return pose if keys is None else _disturbed(settings, pose, jnp.diff(t), keys[1:])
+    return _optics(settings, Pose(*(column[grid.at_row] for column in states.pose)))
+
+
+def disturb(pose: Pose, vector: Array, t: Array, *, noise: Noise | None, key: Array, parts: frozenset[str]) -> Pose:
+    """The camera's random errors on poses (samples,): its noise, then those among the effects."""
+    if noise is not None:
+        pose = observe(pose, noise, draw_noise(key, len(t)), jnp.diff(t))
+    return _disturbed(_settings(vector, parts), pose, jnp.diff(t), _keys(key)[1:])
+
+
+def _settings(vector: Array, parts: frozenset[str]) -> Settings:
+    return {name: values for name, values in by_name(vector).items() if name in parts}
+
+
+def _keys(key: Array) -> Array:
+    """Keys of the random effects, apart from that of the noise."""
+    return jax.random.split(jax.random.fold_in(key, 1), 5)
+
+
+def substeps_for(parts: frozenset[str]) -> int:
+    """Substeps that give 1e-6 m over 200 samples, with corners 1e-4 m."""
+    return SHARP_SUBSTEPS if parts & SHARP else SUBSTEPS
 
 
 def _sent(settings: Settings, command: Wheels, key: Array | None) -> Wheels:

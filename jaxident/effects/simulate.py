@@ -6,7 +6,7 @@ import numpy as np
 from jaxident.array_types import AT_REST, Array, Pose, State
 from jaxident.effects.catalogue import CATALOGUE, to_vector
 from jaxident.effects.checks import check_delay, check_effects
-from jaxident.effects.full import SHARP, SHARP_SUBSTEPS, SUBSTEPS, run_full
+from jaxident.effects.full import run_full, substeps_for
 from jaxident.log import Log
 from jaxident.robot import simulate as nominal
 from jaxident.robot.model import Model, require_physical
@@ -33,7 +33,7 @@ def simulate(
     parts = frozenset(effect.name for effect in model.effects)
     vector = to_vector(model.effects)
     pose = _poses(model.dynamics, model.dead_zone, vector, log, start, model.noise, key, session_time,
-                  substeps=SHARP_SUBSTEPS if parts & SHARP else SUBSTEPS, parts=parts)  # fmt: skip
+                  substeps=substeps_for(parts), parts=parts)  # fmt: skip
     return log._replace(x=pose.x, y=pose.y, theta=pose.theta)
 
 

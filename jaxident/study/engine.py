@@ -10,6 +10,7 @@ import jax
 import numpy as np
 
 from jaxident.array_types import Wheels
+from jaxident.effects.catalogue import to_vector
 from jaxident.numerics import require_float64
 from jaxident.robot.excitation import EXCITATIONS
 from jaxident.robot.model import require_physical
@@ -84,7 +85,7 @@ def run_one(study: Study, number: int) -> tuple[Recording, Outcome]:
     cell = jax.tree.map(lambda leaf: leaf[0], cells(study, index))
     command = Wheels(*(u[0] for u in _commands(study, index, cells(study, index))))
     outcome = _run(study, np.repeat(index, block_size(study), axis=1), 1)
-    recording = jax.jit(record)(jax.random.key(study.seed), cell, command)
+    recording = jax.jit(record, static_argnames="effects")(jax.random.key(study.seed), cell, command, study.effects)
     return jax.tree.map(np.asarray, recording), Outcome(*(part[0] for part in outcome))
 
 
@@ -144,7 +145,7 @@ def _program(study: Study, size: int) -> Callable[[int], Callable[..., Outcome]]
     cell = cells(study, np.zeros((len(AXES), size), int))
     leaves, tree = jax.tree.flatten(cell)
     shapes = tuple((leaf.shape, str(leaf.dtype)) for leaf in leaves)
-    return lambda samples: _compiled(Plan(samples, study.estimators), tree, shapes)
+    return lambda samples: _compiled(Plan(samples, study.estimators, study.effects), tree, shapes)
 
 
 @functools.lru_cache(maxsize=64)
@@ -181,4 +182,5 @@ def _robots(study: Study) -> Robot:
         np.array([model.dead_zone for model in models], float),
         np.array(slips, float) if np.any(np.array(slips, float)) else None,
         np.array([candidate.spread for candidate in study.robots], float).reshape(-1, len(PARTS)),
+        np.array([to_vector(model.effects) for model in models], float) if study.effects else None,
     )
