@@ -14,6 +14,7 @@ import jax.numpy as jnp
 from jaxident.array_types import Array, Increment, Pose, Wheels
 from jaxident.errors import InputError
 from jaxident.estimation import recursive
+from jaxident.estimation.batch_covariance import batch_covariance
 from jaxident.estimation.identify import D_MAX_SHARE, SETUP_SAMPLES, SETUP_SHARE, SMALLEST_LOG, parameter_covariance
 from jaxident.estimation.initialise import Setup, initialise
 from jaxident.estimation.maximum_likelihood import fit_runs
@@ -134,7 +135,7 @@ def batch(sight: Sight, settings: dict[str, Any]) -> Finding:
     """PAPER section VI on the first rows (default: all): linear least squares, then the nonlinear cost (21)."""
     rows = len(sight.log.t)
     first, setup, variance = _start(sight, settings, settings["setup_samples"] or rows, 1.0)
-    return _finding(first, setup, variance)
+    return _finding(first, setup, variance, batch_covariance)
 
 
 def recursively(sight: Sight, settings: dict[str, Any]) -> Finding:
@@ -144,7 +145,7 @@ def recursively(sight: Sight, settings: dict[str, Any]) -> Finding:
     first, setup, variance = _start(sight, settings, count, settings["forgetting"])
     late = recursive.tail(sight.observations, min(rows, count) - 2)
     if not len(late.command.right):
-        return _finding(first, setup, variance)
+        return _finding(first, setup, variance, batch_covariance)
 
     def body(carry, sample):
         estimate, squares = carry
@@ -181,8 +182,8 @@ def _start(sight: Sight, settings: dict[str, Any], count: int, forgetting: float
     return first, setup, jnp.sum(left**2, axis=1) / spare
 
 
-def _finding(last: recursive.Estimate, setup: Setup, variance: Array) -> Finding:
-    covariance = parameter_covariance(last, Increment(variance[0], variance[1]))
+def _finding(last: recursive.Estimate, setup: Setup, variance: Array, covariance_of=parameter_covariance) -> Finding:
+    covariance = covariance_of(last, Increment(variance[0], variance[1]))
     deviation = jnp.sqrt(jnp.maximum(jnp.diagonal(covariance), 0.0))
     reason = jnp.where(setup.ok, FOUND, NO_START)
     return Finding(difference_vector(*recursive.parameters(last)), deviation, reason)
