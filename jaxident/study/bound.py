@@ -13,7 +13,7 @@ from jaxident.estimation.parameters import Law, Robot, to_vector
 from jaxident.estimation.precision import bound_covariance, difference_covariance
 from jaxident.estimation.runs import Runs
 from jaxident.numerics import require_float64
-from jaxident.robot.model import DIFFERENCE_ORDER
+from jaxident.robot.model import DIFFERENCE_ORDER, require_physical
 from jaxident.robot.noise import Noise
 from jaxident.study.design import AXES, Study
 from jaxident.study.engine import cells
@@ -69,7 +69,7 @@ def _variances(base: Array, where: Cell, command: Wheels, law: Law) -> Array:
         robot = draw_robot(seed_keys(base, cell)[0], cell)
         slips = (0.0, 0.0) if cell.robot.slip is None else cell.robot.slip
         noise = Noise(cell.position, cell.heading, cell.correlation_time, *slips)
-        vector = to_vector(Robot(robot.dynamics, robot.dead_zone, noise), law)
+        vector = to_vector(Robot(require_physical(robot), robot.dead_zone, noise), law)
         blank = jnp.zeros((1, *jnp.shape(command.right)))
         runs = Runs(cell.period, Wheels(*(u[None] for u in command)), Pose(blank, blank, blank), blank == 0.0)
         covariance = bound_covariance(vector, jnp.asarray(AT_REST, float), runs, law)

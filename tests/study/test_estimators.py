@@ -1,6 +1,7 @@
 """The estimators of a study, side by side on the same logs."""
 
 import numpy as np
+import pytest
 from support.studies import SMALL
 
 from jaxident.robot.drive import Physical
@@ -31,6 +32,7 @@ def test_likelihood_knows_of_the_camera_and_the_papers_method_does_not():
         assert rmse.sel(estimator=name) > 0.3  # the printed reading shrinks the pole towards zero
 
 
+@pytest.mark.slow
 def test_batch_claims_what_its_dead_zones_scatter():
     """The heading's equation determines them; an average with those of the path length would claim twenty times more.
     Forty trials tell a standard deviation to 11 %."""
