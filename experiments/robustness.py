@@ -106,7 +106,7 @@ def _own(rows: list[dict], effect: str, estimator: str) -> list[dict]:
 def draw(rows: list[dict], seeds: int, path: pathlib.Path) -> None:
     """Size of the bias in per cent, effects by parameters, one map for each estimator."""
     names = ["none", *CATALOGUE]
-    figure, axes = ji.plot.figure(1, 2, size=(13.5, 8.4), sharey=True)
+    figure, axes = ji.plot.figure(1, 2, size=(13.5, 8.4))
     columns = [written(name).symbol for name in DIFFERENCE_ORDER]
     for ax, estimator in zip(axes, ESTIMATORS, strict=True):
         values = np.full((len(names), len(columns)), np.nan)

@@ -60,13 +60,13 @@ def crossing(noise: np.ndarray, share: np.ndarray, at: float) -> float:
 def draw(noise: np.ndarray, found: dict, path: pathlib.Path) -> None:
     """Share of smaller errors against noise, a panel for each excitation."""
     kinds = list(dict.fromkeys(kind for kind, _ in found))
-    figure, axes = ji.plot.figure(1, len(kinds), size=(9.0, 3.4), sharey=True)
+    figure, axes = ji.plot.figure(1, len(kinds), size=(9.0, 3.4))
     for ax, kind in zip(axes, kinds, strict=True):
         for name in SETS:
             ax.semilogx(1e3 * noise, 100.0 * found[kind, name], marker="o", markersize=3.5, label=name)
         ax.axhspan(*(100.0 * level for level in POSSIBLE), color="0.93", zorder=0)
         ax.axhline(50.0, color="0.5", linewidth=0.8, linestyle="--")
-        ax.set(title=kind, xlabel="camera noise in position [mm]")
+        ax.set(title=kind, xlabel="camera noise in position [mm]", ylim=(-4.0, 104.0))
     axes[0].set_ylabel("trials with smaller errors than the paper's [%]")
     axes[-1].legend(frameon=False)
     ji.plot.save(figure, path)

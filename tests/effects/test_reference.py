@@ -8,6 +8,7 @@ from support.reference_effects import simulate_reference
 
 import jaxident as ji
 from jaxident.effects import CATALOGUE
+from jaxident.effects.full import _keys
 
 PARAMETERS = ROBOT.physical._asdict() | {"dead_zone": ROBOT.dead_zone}
 CORNERS = ("coulomb_friction", "stiction", "backlash", "input_rate_limit")
@@ -57,3 +58,23 @@ def test_random_effects_have_the_reference_s_statistics(name):
     error = np.sqrt(sum(np.var(each, axis=0, ddof=1) / 64 for each in squares))
     assert np.all(squares[1].mean(axis=0) > 0)
     assert np.all(np.abs(squares[0].mean(axis=0) - squares[1].mean(axis=0)) < 4.0 * error)
+
+
+class _Replay:
+    """A generator whose uniform draws are given."""
+
+    def __init__(self, draws):
+        self.draws = iter(draws)
+
+    def random(self):
+        return float(next(self.draws))
+
+
+def test_lost_commands_are_those_of_the_reference_row_by_row():
+    """With the same draws, of which the first row needs none."""
+    log, key = drive_log(), jax.random.key(4)
+    draws = np.asarray(jax.random.uniform(_keys(key)[0], (len(log.t),)))
+    expected = reference(("lost_commands",), log, rng=_Replay(draws[1:]))
+    found = poses(ji.simulate(typical("lost_commands"), log, start=START, key=key))
+    assert np.abs(found - expected).max() < 1e-6
+    assert np.abs(found - reference((), log)).max() > 1e-2
