@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jaxident.array_types import Array, Increment
 from jaxident.estimation import recursive
 from jaxident.estimation.least_squares import full_covariance
-from jaxident.numerics import safe_divide
+from jaxident.numerics import safe_divide, solve_positive
 from jaxident.robot.model import DIFFERENCE_ORDER
 
 PLACES = (0, 2, 3, 6, 7, 10, 11), (1, 4, 5, 8, 9, 10, 11)
@@ -37,6 +37,7 @@ def _own_parameters(unknowns: recursive.Vector) -> Array:
 
 
 def _inverse(matrix: Array) -> Array:
-    """Of a covariance or an information whose entries differ by many orders of magnitude."""
+    """Of a covariance or an information (n, n) whose entries differ by many orders of magnitude."""
     scale = 1.0 / jnp.sqrt(jnp.maximum(jnp.diagonal(matrix), jnp.finfo(float).tiny))
-    return scale[:, None] * jnp.linalg.inv(scale[:, None] * matrix * scale) * scale
+    scaled = scale[:, None] * matrix * scale
+    return scale[:, None] * jax.vmap(solve_positive, (None, 1), 1)(scaled, jnp.eye(len(matrix))) * scale

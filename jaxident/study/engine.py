@@ -16,6 +16,7 @@ from jaxident.robot.excitation import EXCITATIONS
 from jaxident.robot.model import require_physical
 from jaxident.study.batch import in_parallel
 from jaxident.study.design import AXES, PARTS, Study
+from jaxident.study.estimators import runs_alone
 from jaxident.study.trial import Cell, Outcome, Plan, Recording, Robot, commands, record, run_trial
 
 BLOCK = {"cpu": 50}
@@ -131,6 +132,8 @@ def _run(study: Study, index: np.ndarray, cores: int | None) -> Outcome:
         return jax.tree.map(np.asarray, program(base, *_spread((where, _commands(study, block, where)))))
 
     blocks = [(block,) for block in np.split(padded, padded.shape[1] // size, axis=1)]
+    if any(runs_alone(choice) for choice in study.estimators):
+        cores = 1
     outcomes = in_parallel(work, blocks, cores)
     return Outcome(*(np.concatenate(part)[:count] for part in zip(*outcomes, strict=True)))
 

@@ -74,10 +74,16 @@ class Setting(NamedTuple):
 
 
 class Method(NamedTuple):
-    """run(sight, settings) -> Finding, and the settings it takes."""
+    """run(sight, settings) -> Finding, and the settings it takes.
+
+    alone: no two of its programs may run at once in a process. Its eigenvalues come from LAPACK, whose batched call
+    hands its work to XLA's threads and waits for them, on one of these itself; with as many programs as threads, all
+    wait for ever.
+    """
 
     run: Callable[[Sight, dict[str, Any]], Finding]
     settings: dict[str, Setting]
+    alone: bool = False
 
 
 class Choice(NamedTuple):
@@ -92,6 +98,11 @@ def settings_of(choice: Choice) -> dict[str, Any]:
     """All settings of a choice, defaults included."""
     known = METHODS[choice.method].settings
     return {key: setting.default for key, setting in known.items()} | dict(choice.settings)
+
+
+def runs_alone(choice: Choice) -> bool:
+    """Whether programs with this estimator run one at a time in a process; see `Method`."""
+    return METHODS[choice.method].alone
 
 
 def check_choice(choice: Choice, where: str) -> None:
@@ -209,6 +220,6 @@ METHODS = {
         recursively,
         _PAPER | {"forgetting": Setting(1.0, _number(0.0, 1.0), "a number above 0 and at most 1")},
     ),
-    "maximum-likelihood": Method(likelihood, _LIKELIHOOD),
+    "maximum-likelihood": Method(likelihood, _LIKELIHOOD, alone=True),
 }
 """Every estimator by name."""
