@@ -4,9 +4,9 @@
 
 The published robot without coupling, each effect of the catalogue alone at three strengths (in typical sizes), the
 same seeds for all. Both estimators know of no effect: what their estimates are off by is the effect's doing, but for
-the row `none`, which is that of the camera's noise. Writes robustness.csv (bias of each parameter with its Monte-Carlo
+the row `none`, which is that of the camera's noise; a trial that fails is counted and in no bias. Writes robustness.csv (bias of each parameter with its Monte-Carlo
 standard error, in SI units and per cent of the parameter), robustness.md (the largest biases in words of numbers) and
-robustness.png (size of the bias, empty where it is not clear of zero). Shards of seeds run in one folder and go on
+robustness.png (size of the bias, empty where small or not clear of zero). Shards of seeds run in one folder and go on
 where they stopped: `--out` holds the store.
 """
 
@@ -24,8 +24,10 @@ from jaxident.robot.model import DIFFERENCE_ORDER
 
 STRENGTHS = (0.5, 1.0, 2.0)
 SHOWN = STRENGTHS[1]
-CLEAR = 3.0
-"""Standard errors from which a bias is clear of zero."""
+CLEAR, SMALL = 3.0, 0.1
+"""Standard errors, and per cent of the parameter, from which a bias is shown."""
+
+COLOURS = (SMALL, 100.0)
 
 ESTIMATORS = {"paper": "recursive", "likelihood": "maximum-likelihood"}
 
@@ -103,22 +105,24 @@ def _own(rows: list[dict], effect: str, estimator: str) -> list[dict]:
     return [r for r in rows if (r["effect"], r["strength"], r["estimator"]) == (effect, size, estimator)]
 
 
+def _shown(size: float, error: float) -> float:
+    """A bias to two digits, or NaN where it is not shown."""
+    return float(f"{size:.2g}") if size >= max(SMALL, CLEAR * error) else np.nan
+
+
 def draw(rows: list[dict], seeds: int, path: pathlib.Path) -> None:
     """Size of the bias in per cent, effects by parameters, one map for each estimator."""
     names = ["none", *CATALOGUE]
-    figure, axes = ji.plot.figure(1, 2, size=(13.5, 8.4))
+    figure, axes = ji.plot.figure(1, 2, size=(12.0, 8.4))
     columns = [written(name).symbol for name in DIFFERENCE_ORDER]
     for ax, estimator in zip(axes, ESTIMATORS, strict=True):
         values = np.full((len(names), len(columns)), np.nan)
         for k, effect in enumerate(names):
             own = _own(rows, effect, estimator)
-            clear = [abs(r["percent"]) if abs(r["percent"]) > CLEAR * r["percent_se"] else np.nan for r in own]
-            values[k] = clear
-        labels = [name.replace("_", " ") for name in names]
-        label = (
-            f"{estimator}: size of the bias [% of the parameter], empty below {CLEAR:g} standard errors, {seeds} seeds"
-        )
-        ji.plot.heat_map(values, rows=labels, columns=columns, label=label, ax=ax)
+            values[k] = [_shown(abs(row["percent"]), row["percent_se"]) for row in own]
+        labels = [name.replace("_", " ") for name in names] if ax is axes[0] else [""] * len(names)
+        label = f"{estimator}: bias [%], empty below {SMALL:g} % or {CLEAR:g} standard errors ({seeds} seeds)"
+        ji.plot.heat_map(values, rows=labels, columns=columns, label=label, ax=ax, limits=COLOURS)
     ji.plot.save(figure, path)
 
 

@@ -81,7 +81,7 @@ def main() -> None:
     study = ji.read_study(HERE / "typical_noise.toml")
     study = study._replace(seeds=options.seeds or study.seeds)
     trials = ji.study(study, out=options.out)
-    simplified = ji.load_model("published_simplified")
+    simplified = ji.load_model("published-simplified")
     printed = np.asarray(difference_vector(simplified.difference, simplified.dead_zone))
     noise, found = np.asarray(study.noise), shares(trials, printed)
     with open(options.out / "typical_noise.csv", "w", newline="") as stream:
