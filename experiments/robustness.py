@@ -4,10 +4,10 @@
 
 The published robot without coupling, each effect of the catalogue alone at three strengths (in typical sizes), the
 same seeds for all. Both estimators know of no effect: what their estimates are off by is the effect's doing, but for
-the row `none`, which is that of the camera's noise; a trial that fails is counted and in no bias. Writes robustness.csv (bias of each parameter with its Monte-Carlo
-standard error, in SI units and per cent of the parameter), robustness.md (the largest biases in words of numbers) and
-robustness.png (size of the bias, empty where small or not clear of zero). Shards of seeds run in one folder and go on
-where they stopped: `--out` holds the store.
+the row `none`, which is that of the camera's noise; a trial that fails is counted and in no bias. Writes
+robustness.csv (bias of each parameter with its Monte-Carlo standard error, in SI units and per cent of the parameter),
+robustness.md (the parameter that each effect moves furthest) and robustness.png (size of the bias, empty where small or
+not clear of zero). The study's store lies in the same folder: stopped, the same command goes on.
 """
 
 import argparse
