@@ -20,7 +20,7 @@ import xarray
 
 STUDY = """
 name = "killed"
-seeds = 200
+seeds = 600
 noise = [1e-6, 1e-5, 1e-4]
 samples = [100]
 hold = 4

@@ -3,12 +3,12 @@
 import jax
 import numpy as np
 import pytest
-from support.effect_robots import ROBOT, START, drive_log, poses, typical
+from support.effect_robots import ROBOT, START, drive_log, full, poses, typical
 from support.reference_effects import simulate_reference
 
 import jaxident as ji
-from jaxident.effects import CATALOGUE
-from jaxident.effects.full import _keys
+from jaxident.effects import CATALOGUE, to_vector
+from jaxident.effects.full import _keys, substeps_for
 
 PARAMETERS = ROBOT.physical._asdict() | {"dead_zone": ROBOT.dead_zone}
 CORNERS = ("coulomb_friction", "stiction", "backlash", "input_rate_limit")
@@ -29,12 +29,24 @@ def reference(names, log, **options):
     )
 
 
+def tolerance(names):
+    """200 samples: position to 1e-6 m, with corners to 1e-4 m, heading to as many radians."""
+    return 1e-4 if any(name in CORNERS for name in names) else 1e-6
+
+
 @pytest.mark.parametrize("names", SETS, ids="+".join)
 def test_the_trajectory_is_that_of_the_reference(names):
-    """200 samples: position to 1e-6 m, with corners to 1e-4 m, heading to as many radians."""
+    """In the program that holds all effects, which is compiled once."""
     log = drive_log()
-    error = np.abs(poses(ji.simulate(typical(*names), log, start=START)) - reference(names, log))
-    assert error.max() < (1e-4 if any(name in CORNERS for name in names) else 1e-6)
+    found = full(to_vector(typical(*names).effects), log, substeps=substeps_for(frozenset(names)))
+    assert np.abs(found - reference(names, log)).max() < tolerance(names)
+
+
+@pytest.mark.parametrize("names", [pytest.param(s, marks=[pytest.mark.slow] * (len(s) == 1)) for s in SETS])
+def test_a_program_of_these_effects_alone_does_the_same(names):
+    log = drive_log()
+    found = poses(ji.simulate(typical(*names), log, start=START))
+    assert np.abs(found - reference(names, log)).max() < tolerance(names)
 
 
 @pytest.mark.parametrize("names", [("transport_delay",), ("payload_change",), ("motor_lag", "slope")], ids="+".join)
