@@ -5,7 +5,7 @@
 The published robot at each effect's typical size and the nominal one under the same commands: what a tenth of a second
 takes the one further than the other, each in the frame of its own pose at the start, against command, speed, heading,
 position and time. Along and lateral stand against the mean command and v, heading against half the difference of the
-commands and w. One picture per effect, and one sheet of all.
+commands and w: labels give both, for along and lateral | for heading. One picture per effect, and one sheet of all.
 """
 
 import argparse
@@ -70,8 +70,8 @@ def main() -> None:
     u_r, u_l = (np.asarray(u)[rows] for u in log.command)
     v, w = (motion[:, k] / np.abs(motion[:, k]).max() for k in (0, 2))
     regressors = {
-        "command [unit]": channels((u_r + u_l) / 2, (u_r - u_l) / 2),
-        "speed over its largest": channels(v, w),
+        "mean | half-difference command [unit]": channels((u_r + u_l) / 2, (u_r - u_l) / 2),
+        "speed | turn rate, over its largest": channels(v, w),
         "heading [rad]": channels(np.mod(nominal[rows, 2], 2 * np.pi)),
         "position $x$ [m]": channels(nominal[rows, 0]),
         "time [s]": channels(np.asarray(log.t)[rows]),
@@ -83,10 +83,13 @@ def main() -> None:
         figure, axes = ji.plot.figure(1, len(regressors), size=(13.0, 1.9))
         ji.plot.effect_signature(name, found[name], regressors, axes=axes)
         ji.plot.save(figure, options.out / f"{name}.png")
-    figure, axes = ji.plot.figure(len(found), len(regressors), size=(13.0, 1.45 * len(found)))
+    figure, axes = ji.plot.figure(len(found), len(regressors), size=(13.0, 1.15 * len(found)), share_x=True)
     in_order = sorted(found, key=lambda name: SITES.index(CATALOGUE[name].site))
     for name, row in zip(in_order, axes, strict=True):
         ji.plot.effect_signature(f"{name} ({CATALOGUE[name].site})", found[name], regressors, axes=row)
+        if name != in_order[-1]:
+            for ax in row:
+                ax.set_xlabel("")
     ji.plot.save(figure, options.out / "sheet.png")
 
 

@@ -46,6 +46,7 @@ def _run_all(plan, out, scheduler):
     from jaxident.files.sweeps import Told, sweep
     from jaxident.files.trials import open_trials
     from jaxident.report.sweep import write_study
+    from jaxident.study.bound import bounds
     from jaxident.study.statistics import summarise
 
     def damaged(count):
@@ -56,7 +57,7 @@ def _run_all(plan, out, scheduler):
     wrote(path)
     with working("summing up"):
         trials = open_trials(path)
-        summary = summarise(trials)
+        summary = summarise(trials, bounds(plan))
         paths = [write_summary(summary, os.path.join(out, "summary.csv"))]
         paths += write_study(plan, trials, summary, os.path.join(out, "index.html"))
     for name in paths:

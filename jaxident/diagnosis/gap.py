@@ -16,6 +16,8 @@ from jaxident.diagnosis.windows import Windows
 
 REPLAYS, RESAMPLES = 400, 1000
 LEVEL = 0.9
+STEPS = 3
+"""Of the search for a window's start state."""
 CHANNELS = ("along", "lateral", "heading")
 
 
@@ -34,12 +36,11 @@ def errors(vectors: Array, starts: Array, windows: Windows, law: Law, responses:
     vectors (models, SIZE), starts (models, 5, windows)."""
     inverse, rows = _early(law, windows, responses, burn)
     starts = np.array(starts)
-    for _ in range(2):
-        residual = follow(vectors, starts, windows)
-        for model, found in enumerate(residual):
-            slope = answer_to_start(np.exp(vectors[model][:2]), found, windows)[:, :rows]
+    for model, vector in enumerate(vectors):
+        for _ in range(STEPS):
+            found, slope = _by_start(vector, starts[model], windows, rows)
             normal = slope.transpose(0, 2, 1) @ inverse @ slope
-            right = slope.transpose(0, 2, 1) @ inverse @ found[:, :rows, None]
+            right = slope.transpose(0, 2, 1) @ inverse @ found[..., None]
             starts[model] += np.linalg.solve(normal + 1e-9 * _scale(normal), right)[..., 0].T
     residual = follow(vectors, starts, windows)
     seen = np.asarray(windows.seen)[-1]
@@ -63,6 +64,15 @@ def floor_of(vector: Array, residual: Array, windows: Windows, law: Law, respons
     seen = np.asarray(windows.seen)[-1]
     turned = turned[seen]
     return Floor(float(np.mean(turned)), turned.mean(axis=(0, 1)), turned.mean(axis=2))
+
+
+def _by_start(vector: Array, starts: Array, windows: Windows, numbers: int) -> tuple[np.ndarray, np.ndarray]:
+    """First residuals (windows, numbers) and derivatives of the modelled poses by the start state (windows, numbers,
+    5), by differences: with a traction limit or dry friction a speed does not decay as the nominal one does."""
+    step = np.array([1e-5, 1e-5, 1e-5, 1e-5, 1e-4])
+    lanes = np.concatenate([starts[None], starts + step[:, None, None] * np.eye(5)[:, :, None]])
+    found = follow(np.tile(vector, (6, 1)), lanes, windows)[:, :, :numbers]
+    return found[0], np.moveaxis((found[0] - found[1:]) / step[:, None, None], 0, -1)
 
 
 class Shrink(NamedTuple):

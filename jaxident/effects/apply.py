@@ -1,10 +1,12 @@
-"""Effects put into a model."""
+"""Effects put into a model, and their sizes."""
 
 import dataclasses
+import math
 from collections.abc import Iterable
 from typing import Any
 
 from jaxident.effects.checks import check_effects
+from jaxident.effects.entry import Entry
 from jaxident.robot.model import Effect, Model
 
 
@@ -18,3 +20,14 @@ def with_effects(model: Model, effects: Iterable[tuple[str, dict[str, Any]]]) ->
     kept = tuple(effect for effect in model.effects if effect.name not in names)
     check_effects((*kept, *new))
     return dataclasses.replace(model, effects=(*kept, *new))
+
+
+def sized(entry: Entry, strength: float) -> dict[str, float]:
+    """An effect's parameters at `strength` times its typical distance from neutral; where neutral is infinite, typical
+    over strength. Parameters that only shape it stay typical."""
+    values = {}
+    for parameter in entry.parameters:
+        distance = parameter.typical - parameter.neutral
+        size = parameter.typical / strength if math.isinf(distance) else parameter.neutral + strength * distance
+        values[parameter.name] = parameter.typical if parameter.shape else size
+    return values

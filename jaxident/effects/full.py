@@ -9,16 +9,26 @@ import jax.numpy as jnp
 from jaxident.array_types import Array, Pose, State, Wheels
 from jaxident.effects import camera
 from jaxident.effects.actuation import input_quantisation, input_saturation, lost_commands
-from jaxident.effects.catalogue import by_name
-from jaxident.effects.input_chain import AT_REST, push
+from jaxident.effects.catalogue import CATALOGUE, by_name
+from jaxident.effects.input_chain import at_rest, push
 from jaxident.effects.intervals import Grid, make_grid
-from jaxident.effects.substep import move, solve
-from jaxident.robot.drive import Force, Physical
+from jaxident.effects.substep import ADDED, FRICTION, move, solve_half
+from jaxident.robot.drive import Force, Physical, advance, force, hold
 from jaxident.robot.noise import Noise, correlated, draw_noise, observe, slip
 
 SUBSTEPS = 4
-"""Per interval; enough for 1e-6 m in a run of 200 samples where the effects are smooth."""
+"""Per camera interval; enough for 1e-6 m in a run of 200 samples where the effects are smooth."""
 
+SHARP_SUBSTEPS = 16
+"""Where an effect has corners within a sample (friction, stiction, play, slew, the |w| of turn_loss)."""
+
+SHARP = FRICTION | {"turn_loss", "backlash", "input_rate_limit"}
+MOVING = (
+    FRICTION | ADDED | {"backlash", "input_rate_limit", "motor_lag", "lateral_slip", "gain_drift", "dead_zone_drift"}
+)
+"""Without these the force is held and the drive linear: its exact solution needs no substeps."""
+
+EVERY = frozenset(CATALOGUE)
 Settings = Mapping[str, dict[str, Any]]
 
 
@@ -34,6 +44,7 @@ def run_full(
     key: Array | None = None,
     session_time: Array = 0.0,
     substeps: int = SUBSTEPS,
+    parts: frozenset[str] = EVERY,
 ) -> Pose:
     """Poses (samples,) that the camera reports of one run.
 
@@ -41,73 +52,127 @@ def run_full(
     command: (samples,), steps may differ. start: the robot's own state, not the marker's. Without a key nothing is
     drawn: neither `noise` nor the random effects act. session_time [s]: that of the first row. substeps is static.
     Pure: works under jit, vmap and grad; the derivative by a delay is one of its value and the commands' switches.
+
+    parts, static: names of the effects that the program holds; of the others the vector is not read. The default, all
+    of them, makes one program for every set; a program of few effects compiles and runs several times faster, and one
+    without friction, play, lag and the like takes no substeps.
     """
-    settings = by_name(vector)
-    keys = None if key is None else jax.random.split(jax.random.fold_in(key, 1), 5)
-    unit = None if key is None else draw_noise(key, len(t))
-    sent = _sent(settings, command, None if keys is None else keys[0])
-    change = settings["payload_change"]["instant"] - session_time + t[0]
-    grid = make_grid(t, sent, settings["transport_delay"]["delay"], change)
-    push_aside = Force(jnp.zeros_like(t), jnp.zeros_like(t))
-    if unit is not None and noise is not None:
-        push_aside = slip(noise, unit, jnp.append(jnp.diff(t), 1.0))
-    states = _scan(settings, drive, dead_zone, grid, push_aside, start, session_time - t[0], substeps)
-    pose = _optics(settings, Pose(*(column[grid.at_row] for column in states.pose)))
-    if unit is not None and noise is not None:
-        pose = observe(pose, noise, unit, jnp.diff(t))
-    return pose if keys is None else _disturbed(settings, pose, jnp.diff(t), keys[1:])
+    pose = run_undisturbed(drive, dead_zone, vector, t, command, start, noise=noise, key=key, session_time=session_time,
+                           substeps=substeps, parts=parts)  # fmt: skip
+    return pose if key is None else disturb(pose, vector, t, noise=noise, key=key, parts=parts)
+
+
+def run_undisturbed(
+    drive, dead_zone, vector, t, command: Wheels, start: State, *, noise, key, session_time=0.0, substeps, parts
+) -> Pose:
+    """`run_full` before `disturb`: poses (samples,) as the camera would report them if it made no random error."""
+    settings = _settings(vector, parts)
+    sent = _sent(settings, command, None if key is None else _keys(key)[0])
+    grid = _grid(settings, t, sent, session_time, substeps)
+    push_aside = None
+    if key is not None and noise is not None:
+        drawn = slip(noise, draw_noise(key, len(t)), jnp.append(jnp.diff(t), 1.0))
+        push_aside = Force(*(f[grid.row] for f in drawn))
+    states = _scan(settings, drive, dead_zone, grid, push_aside, start, session_time - t[0])
+    return _optics(settings, Pose(*(column[grid.at_row] for column in states.pose)))
+
+
+def disturb(pose: Pose, vector: Array, t: Array, *, noise: Noise | None, key: Array, parts: frozenset[str]) -> Pose:
+    """The camera's random errors on poses (samples,): its noise, then those among the effects."""
+    if noise is not None:
+        pose = observe(pose, noise, draw_noise(key, len(t)), jnp.diff(t))
+    return _disturbed(_settings(vector, parts), pose, jnp.diff(t), _keys(key)[1:])
+
+
+def _settings(vector: Array, parts: frozenset[str]) -> Settings:
+    return {name: values for name, values in by_name(vector).items() if name in parts}
+
+
+def _keys(key: Array) -> Array:
+    """Keys of the random effects, apart from that of the noise."""
+    return jax.random.split(jax.random.fold_in(key, 1), 5)
+
+
+def substeps_for(parts: frozenset[str]) -> int:
+    """Substeps that give 1e-6 m over 200 samples, with corners 1e-4 m."""
+    return SHARP_SUBSTEPS if parts & SHARP else SUBSTEPS
 
 
 def _sent(settings: Settings, command: Wheels, key: Array | None) -> Wheels:
     """The commands (samples,) that enter the delay line."""
-    level, step = settings["input_saturation"]["level"], settings["input_quantisation"]["step"]
-    sent = Wheels(*(input_quantisation(input_saturation(jnp.asarray(u), level), step) for u in command))
-    if key is None:
-        return sent
-    lost = jax.random.uniform(key, jnp.shape(sent.right)) < settings["lost_commands"]["probability"]
-    return Wheels(*(lost_commands(u, lost) for u in sent))
+    sent = Wheels(*(jnp.asarray(u) for u in command))
+    if "lost_commands" in settings and key is not None:
+        lost = jax.random.uniform(key, jnp.shape(sent.right)) < settings["lost_commands"]["probability"]
+        sent = Wheels(*(lost_commands(u, lost) for u in sent))
+    if "input_saturation" in settings:
+        sent = Wheels(*(input_saturation(u, settings["input_saturation"]["level"]) for u in sent))
+    if "input_quantisation" in settings:
+        sent = Wheels(*(input_quantisation(u, settings["input_quantisation"]["step"]) for u in sent))
+    return sent
 
 
-def _scan(settings, drive, dead_zone, grid: Grid, slips: Force, start: State, offset: Array, substeps: int) -> State:
+def _grid(settings: Settings, t: Array, sent: Wheels, session_time: Array, substeps: int) -> Grid:
+    """The grid that these effects need."""
+    delay = settings["transport_delay"]["delay"] if "transport_delay" in settings else None
+    change = None
+    if "payload_change" in settings:
+        change = settings["payload_change"]["instant"] - session_time + t[0]
+    return make_grid(t, sent, substeps if settings.keys() & MOVING else 1, delay=delay, change=change)
+
+
+def _scan(settings, drive, dead_zone, grid: Grid, slips: Force | None, start: State, offset: Array) -> State:
     """True states (points,) at the points of the grid; `offset` takes times of the log to session times."""
-    solved = solve(drive, grid.step / substeps)
+    moving = bool(settings.keys() & MOVING)
+    solve = solve_half if moving else hold
+    solved = jax.tree.map(grid.spread, solve(drive, grid.step))
+    length = grid.spread(grid.step)
 
     def interval(carry, now):
-        begin, target, shove, changed, solution = now
+        state, memory = carry
+        begin, h, target, shove, changed, solution = now
+        pushed, memory = push(settings, dead_zone, memory, target, begin, h)
+        if moving:
+            after = move(settings, drive, state, pushed, shove, changed, solution, h)
+        else:
+            pull = force(drive, pushed.mean)
+            if shove is not None:
+                pull = Force(pull.along + shove.along, pull.heading + shove.heading)
+            after = advance(state, pull, solution)
+        return (after, memory), state
 
-        def one(inner, number):
-            state, memory = inner
-            time = begin + number * solution.step
-            pushed, memory = push(settings, dead_zone, memory, target, time, solution.step)
-            return (move(settings, drive, state, pushed, shove, changed, solution), memory), None
-
-        after, _ = jax.lax.scan(one, carry, jnp.arange(substeps))
-        return after, carry[0]
-
-    begin = State(*(jnp.asarray(s, grid.start.dtype) for s in start))
-    remembered = jax.tree.map(lambda value: jnp.asarray(value, grid.start.dtype), AT_REST)
-    shoves = Force(*(f[grid.row] for f in slips))
-    inputs = (grid.start + offset, grid.command, shoves, grid.changed, solved)
-    (last, _), states = jax.lax.scan(interval, (begin, remembered), inputs)
+    like = jnp.zeros_like(grid.start, shape=())
+    begin = State(*(jnp.asarray(s, like.dtype) for s in start))
+    inputs = (grid.start + offset, length, grid.command, slips, grid.changed, solved)
+    (last, _), states = jax.lax.scan(interval, (begin, at_rest(settings, like)), inputs)
     return State(*(jnp.append(column, end) for column, end in zip(states, last, strict=True)))
 
 
 def _optics(settings: Settings, pose: Pose) -> Pose:
     """What the camera makes of true poses without drawing anything."""
-    pose = camera.marker_offset(pose, **settings["marker_offset"])
-    pose = camera.heading_offset(pose, **settings["heading_offset"])
-    pose = camera.lens_distortion(pose, **settings["lens_distortion"])
-    pose = camera.camera_tilt(pose, **settings["camera_tilt"])
-    return camera.camera_scale(pose, **settings["camera_scale"])
+    for act in (
+        camera.marker_offset,
+        camera.heading_offset,
+        camera.lens_distortion,
+        camera.camera_tilt,
+        camera.camera_scale,
+    ):
+        if act.__name__ in settings:
+            pose = act(pose, **settings[act.__name__])
+    return pose
 
 
 def _disturbed(settings: Settings, pose: Pose, step: Array, keys: Array) -> Pose:
     """Random effects of the camera; step [s] (samples - 1,)."""
-    samples = len(pose.x)
-    coloured, rare, frozen = settings["coloured_noise"], settings["outliers"], settings["frozen_frames"]
-    draws = jax.random.normal(keys[0], (3, samples))
-    error = Pose(*(correlated(draw, step, coloured["correlation_time"]) for draw in draws))
-    pose = camera.coloured_noise(pose, error, coloured["position"], coloured["heading"])
-    chance = jax.random.uniform(keys[1], (2, samples))
-    pose = camera.outliers(pose, chance[0], Pose(*jax.random.normal(keys[2], (3, samples))), **rare)
-    return camera.frozen_frames(pose, chance[1], **frozen)
+    shape = len(pose.x)
+    if "coloured_noise" in settings:
+        law = settings["coloured_noise"]
+        draws = jax.random.normal(keys[0], (3, shape))
+        error = Pose(*(correlated(draw, step, law["correlation_time"]) for draw in draws))
+        pose = camera.coloured_noise(pose, error, law["position"], law["heading"])
+    if "outliers" in settings:
+        error = Pose(*jax.random.normal(keys[2], (3, shape)))
+        chance = jax.random.uniform(keys[1], (2, shape))[0]
+        pose = camera.outliers(pose, chance, error, **settings["outliers"])
+    if "frozen_frames" in settings:
+        pose = camera.frozen_frames(pose, jax.random.uniform(keys[1], (2, shape))[1], **settings["frozen_frames"])
+    return pose

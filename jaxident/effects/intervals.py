@@ -1,7 +1,7 @@
-"""The time grid of the full simulator: camera rows, the moments at which delayed commands arrive, a payload change.
+"""The time grid of the full simulator: substeps of the camera's intervals, and what happens between the rows.
 
-Between two points of the sorted grid the command at the end of the delay line is held, so that a delay of any real
-length switches where it should, whatever the steps. Without a delay every second interval has length zero.
+Between two points of the grid the command at the end of the delay line is held and the payload stays as it is, so that
+a delay of any real length switches where it should, whatever the steps.
 """
 
 from typing import Any, NamedTuple
@@ -10,14 +10,13 @@ import jax.numpy as jnp
 
 from jaxident.array_types import Array, Wheels
 
-ROW, ARRIVAL, CHANGE = 0, 1, 2
-
 
 class Grid(NamedTuple):
-    """Sorted points, of which there are 2 samples + 1, and the 2 samples intervals from each to the next.
+    """Intervals from each point of the grid to the next.
 
-    start, step [s]: of each interval; command: what the delay line gives in it; row: the camera row before it;
-    changed: whether the payload has changed; at_row (samples,): the point at which each camera row lies.
+    start [s], command, row (the camera row before it), changed (whether the payload has): of each interval, `changed`
+    None where nothing changes. step [s]: of each interval, or where nothing happens between the rows, of the intervals
+    within each row. at_row (samples,): the point at which each camera row lies.
     """
 
     start: Any
@@ -27,28 +26,49 @@ class Grid(NamedTuple):
     changed: Any
     at_row: Any
 
+    def spread(self, value: Array) -> Array:
+        """A value per step as a value per interval."""
+        return value if len(self.step) == len(self.start) else value[self.row]
 
-def make_grid(t: Array, command: Wheels, delay: Array, change: Array) -> Grid:
+
+def make_grid(
+    t: Array, command: Wheels, substeps: int, *, delay: Array | None = None, change: Array | None = None
+) -> Grid:
     """The grid for camera times and commands (samples,), a delay [s] and the time [s] of a payload change.
 
-    Commands given before the first row are zero; the last command acts on nothing, and may be missing. Points at the
-    same time keep the order rows, arrivals, change: the derivative at zero delay is that of a growing delay.
+    Commands given before the first row are zero; the last command acts on nothing, and may be missing. Without delay
+    and change, (samples - 1) substeps intervals; each arrival of a command, and a change, cuts one in two. Points at
+    the same time keep the order rows, arrivals: the derivative at zero delay is that of a growing delay.
     """
-    samples = len(t)
-    points = jnp.concatenate([t, jnp.minimum(t + delay, t[-1]), jnp.clip(change, t[0], t[-1])[None]])
-    kinds = jnp.repeat(
-        jnp.array([ROW, ARRIVAL, CHANGE]), jnp.array([samples, samples, 1]), total_repeat_length=len(points)
-    )
-    order = jnp.argsort(points, stable=True)
-    points, kinds = points[order], kinds[order]
-    arrived = jnp.cumsum(kinds == ARRIVAL)[:-1]
+    samples, long = len(t), jnp.diff(t)
+    inside = t[:-1, None] + long[:, None] * (jnp.arange(substeps) / substeps)
+    points = jnp.append(inside.ravel(), t[-1])
+    if delay is None and change is None:
+        row = jnp.repeat(jnp.arange(samples - 1), substeps)
+        at_row = substeps * jnp.arange(samples)
+        return Grid(points[:-1], long / substeps, Wheels(*(jnp.asarray(u)[row] for u in command)), row, None, at_row)
+    events = jnp.zeros(0) if delay is None else jnp.minimum(t + delay, t[-1])
+    number: Any = len(events)  # of the change among the events
+    if change is not None:
+        change = jnp.clip(change, t[0], t[-1])
+        number = jnp.searchsorted(events, change)
+        events = _insert(events, number, change)
+    after = jnp.searchsorted(points, events, side="right")
+    happens = jnp.zeros(len(points) + len(events), jnp.int32).at[after + jnp.arange(len(events))].set(1)
+    past = jnp.cumsum(happens)
+    place = jnp.arange(len(past), dtype=jnp.int32) - past
+    merged = jnp.where(happens == 1, events[past - 1], points[place])
+    changed = None if change is None else (past > number)[:-1]
+    row = place[:-1] // substeps
+    arrived = row + 1 if delay is None else past[:-1] - (0 if changed is None else changed)
     acting = jnp.arange(samples) < samples - 1
-    line = Wheels(*(jnp.concatenate([jnp.zeros(1), jnp.where(acting, u, 0.0)]) for u in command))
-    return Grid(
-        start=points[:-1],
-        step=jnp.diff(points),
-        command=Wheels(*(u[arrived] for u in line)),
-        row=jnp.cumsum(kinds == ROW)[:-1] - 1,
-        changed=jnp.cumsum(kinds == CHANGE)[:-1] > 0,
-        at_row=jnp.argsort(order)[:samples],
-    )
+    line = (jnp.concatenate([jnp.zeros(1), jnp.where(acting, u, 0.0)]) for u in command)
+    at_row = substeps * jnp.arange(samples) + jnp.searchsorted(events, t)
+    return Grid(merged[:-1], jnp.diff(merged), Wheels(*(u[arrived] for u in line)), row, changed, at_row)
+
+
+def _insert(values: Array, place: Array, value: Array) -> Array:
+    """The values (n,) with another one before `place`."""
+    rows = jnp.arange(len(values) + 1)
+    longer = jnp.append(values, value)
+    return jnp.where(rows < place, longer, jnp.where(rows == place, value, jnp.roll(longer, 1)))

@@ -6,15 +6,10 @@ import numpy as np
 from jaxident.array_types import AT_REST, Array, Pose, State
 from jaxident.effects.catalogue import CATALOGUE, to_vector
 from jaxident.effects.checks import check_delay, check_effects
-from jaxident.effects.full import SUBSTEPS, run_full
+from jaxident.effects.full import run_full, substeps_for
 from jaxident.log import Log
 from jaxident.robot import simulate as nominal
 from jaxident.robot.model import Model, require_physical
-
-SHARP_SUBSTEPS = 16
-"""Per interval where an effect has corners within a sample (friction, stiction, play, slew, the |w| of turn_loss)."""
-
-SHARP = ("turn_loss", "coulomb_friction", "stiction", "backlash", "input_rate_limit")
 
 
 def simulate(
@@ -35,10 +30,10 @@ def simulate(
     if not isinstance(log.t, jax.core.Tracer):
         t = np.asarray(log.t)
         check_delay(model.effects, float(t[-1] - t[0]))
-    sharp = any(effect.name in SHARP for effect in model.effects)
+    parts = frozenset(effect.name for effect in model.effects)
     vector = to_vector(model.effects)
     pose = _poses(model.dynamics, model.dead_zone, vector, log, start, model.noise, key, session_time,
-                  substeps=SHARP_SUBSTEPS if sharp else SUBSTEPS)  # fmt: skip
+                  substeps=substeps_for(parts), parts=parts)  # fmt: skip
     return log._replace(x=pose.x, y=pose.y, theta=pose.theta)
 
 
@@ -47,8 +42,8 @@ def is_random(model: Model) -> bool:
     return any(CATALOGUE[effect.name].random for effect in model.effects)
 
 
-@jax.jit(static_argnames="substeps")
-def _poses(drive, dead_zone, vector, log: Log, start, noise, key, session_time, *, substeps: int) -> Pose:
+@jax.jit(static_argnames=("substeps", "parts"))
+def _poses(drive, dead_zone, vector, log: Log, start, noise, key, session_time, *, substeps: int, parts) -> Pose:
     command = log.command
     return run_full(drive, dead_zone, vector, log.t, command, start, noise=noise, key=key, session_time=session_time,
-                    substeps=substeps)  # fmt: skip
+                    substeps=substeps, parts=parts)  # fmt: skip

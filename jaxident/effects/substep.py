@@ -2,7 +2,8 @@
 
 With y the nominal solution under held force, known exactly, the state is y + d with d' = A d + N(y + d), d = 0 at the
 start, N what the effects add. d takes one step of Lawson's exponential Runge-Kutta method of order four (Lawson 1967,
-SIAM J. Numer. Anal. 4): where no effect is in force N is exactly zero, and so is d.
+SIAM J. Numer. Anal. 4): where no effect is in force N is exactly zero, and so is d. The nominal solution is that of
+half a substep, taken twice. Effects that are not in the settings are not computed.
 """
 
 from typing import Any, NamedTuple
@@ -14,7 +15,7 @@ from jaxident.effects.contact import lateral_slip, slope, traction_limit
 from jaxident.effects.drive import dry_friction, friction_level, mass_offset, quadratic_drag, turn_loss
 from jaxident.effects.input_chain import Push
 from jaxident.effects.time import payload_change
-from jaxident.numerics import GAUSS_NODES, GAUSS_WEIGHTS, safe_divide, sin_cos
+from jaxident.numerics import safe_divide, sin_cos
 from jaxident.robot.drive import Force, Physical, Response, force, responses, weigh
 
 
@@ -26,130 +27,183 @@ class Motion(NamedTuple):
     theta: Any
 
 
-class Part(NamedTuple):
-    """Exact responses of speed, turn rate and turn after a part of a substep."""
+class Half(NamedTuple):
+    """Exact responses of speed, turn rate and turn after half a substep."""
 
     v: Response
     w: Response
     turn: Response
 
 
-class Solution(NamedTuple):
-    """The linear drive over a substep [s]: at its Gauss nodes, its middle and its end."""
-
-    step: Any
-    nodes: tuple[Part, ...]
-    middle: Part
-    end: Part
+FRICTION = {"coulomb_friction", "stiction"}
+ADDED = {"quadratic_drag", "mass_offset", "turn_loss", "slope", "traction_limit", "payload_change"}
+"""Effects that make the drive depart from the linear one under a held force."""
 
 
-def solve(drive: Physical, step: Array) -> Solution:
-    """The exact solution over a substep of any shape."""
-    *nodes, middle, end = (Part(*part) for part in responses(drive, step, (*GAUSS_NODES, 0.5, 1.0)))
-    return Solution(step, tuple(nodes), middle, end)
+def solve_half(drive: Physical, step: Array) -> Half:
+    """The exact solution over half a substep of any shape."""
+    ((v, w, turn),) = responses(drive, 0.5 * step, (1.0,))
+    return Half(v, w, turn)
 
 
-def move(settings, drive: Physical, state: State, push: Push, slip: Force, changed: Array, solved: Solution) -> State:
-    """The state one substep later, under a push, a random slip (acceleration) and before or after a payload change."""
-    pull, ramp = force(drive, push.mean), force(drive, push.slope)
-    pull = Force(pull.along + slip.along, pull.heading + slip.heading)
-    lightness = payload_change(changed, settings["payload_change"]["ratio"])
+def move(settings, drive: Physical, state: State, push: Push, slip: Force | None, changed, half: Half, h) -> State:
+    """The state one substep of h [s] later, under a push, a random slip (acceleration) and before or after a payload
+    change.
+
+    Friction, held over the substep, moves what the departure depends on, and the other way round: it is settled with
+    a first guess of the departure, and again with the departure that follows.
+    """
+    pull = force(drive, push.mean)
+    if slip is not None:
+        pull = Force(pull.along + slip.along, pull.heading + slip.heading)
+    ramp = None if push.slope is None else force(drive, push.slope)
+    lightness = None if changed is None else payload_change(changed, settings["payload_change"]["ratio"])
+    departs = ramp is not None or bool(settings.keys() & ADDED)
 
     def departure(part: float, now: Motion) -> Motion:
-        return _departure(settings, drive, now, pull, Force(*((part - 0.5) * f for f in ramp)), lightness)
+        later = None if ramp is None else Force(*((part - 0.5) * f for f in ramp))
+        return _departure(settings, drive, now, pull, later, lightness)
 
-    rubbed = pull
-    for _ in range(2):  # friction moves what the departure depends on, and the other way round
-        first, last, d = _runge_kutta(drive, departure, state, rubbed, solved)
-        friction = _friction(settings, drive, state, pull, d, lightness, solved)
-        rubbed = Force(pull.along + friction.along, pull.heading + friction.heading)
-    end = _nominal(solved.end, state, rubbed)
-    x, y = _travel(settings, state, rubbed, (first, last, d), solved)
-    return State(state.x + solved.step * x, state.y + solved.step * y, end.theta + d.theta, end.v + d.v, end.w + d.w)
+    start = Motion(state.v, state.w, state.theta)
+    held, path = pull, None
+    if settings.keys() & FRICTION:
+        guess = _guess(departure, start, half, h) if settings.keys() & ADDED else None
+        held = _rubbed(settings, drive, start, pull, guess, lightness, half)
+    if departs:
+        path = _runge_kutta(drive, departure, start, held, half, h)
+        if settings.keys() & FRICTION:
+            held = _rubbed(settings, drive, start, pull, path[2], lightness, half)
+    return _arrive(settings, drive, state, held, path, half, h)
 
 
-def _departure(settings, drive: Physical, now: Motion, pull: Force, ramp: Force, lightness: Array) -> Motion:
+def _guess(departure, start: Motion, half: Half, h: Array) -> Motion:
+    """The departure at the end of the substep if its rate stays what it is: what friction is first settled with."""
+    moved = _after(half, _after(half, departure(0.5, start)))
+    return Motion(*(h * part for part in moved))
+
+
+def _departure(settings, drive: Physical, now: Motion, pull: Force, ramp: Force | None, lightness) -> Motion:
     """N: acceleration with all effects less that of the linear drive under the held pull."""
     v, w, theta = now
-    along, heading = (linear + held + more for linear, held, more in zip(_linear(drive, v, w), pull, ramp, strict=True))
-    asked = to_wheels(drive, along, heading)
-    taken = Wheels(*(traction_limit(c, settings["traction_limit"]["limit"]) for c in asked))
-    lost = force(drive, Wheels(taken.right - asked.right, taken.left - asked.left))
-    smooth = (
-        quadratic_drag(v, w, **settings["quadratic_drag"]),
-        mass_offset(v, w, **settings["mass_offset"]),
-        turn_loss(v, w, **settings["turn_loss"]),
-        slope(theta, **settings["slope"]),
-    )
-    more = Force(*(sum(parts[1:], parts[0]) for parts in zip(*smooth, strict=True)))
-    return Motion(
-        ramp.along + lightness * lost.along + (lightness - 1.0) * along + more.along,
-        ramp.heading + lightness * lost.heading + (lightness - 1.0) * heading + more.heading,
-        jnp.zeros_like(theta),
-    )
+    along, heading = jnp.zeros_like(v), jnp.zeros_like(w)
+    if ramp is not None:
+        along, heading = ramp
+    if "traction_limit" in settings or lightness is not None:
+        asked = Force(*(a + b + c for a, b, c in zip(_linear(drive, v, w), pull, (along, heading), strict=True)))
+        if "traction_limit" in settings:
+            wheels = to_wheels(drive, *asked)
+            taken = (traction_limit(c, settings["traction_limit"]["limit"]) - c for c in wheels)
+            lost = force(drive, Wheels(*taken))
+            factor = 1.0 if lightness is None else lightness
+            along, heading = along + factor * lost.along, heading + factor * lost.heading
+        if lightness is not None:
+            along, heading = along + (lightness - 1.0) * asked.along, heading + (lightness - 1.0) * asked.heading
+    for more in _smooth(settings, v, w, theta):
+        along, heading = along + more.along, heading + more.heading
+    return Motion(along, heading, jnp.zeros_like(theta))
 
 
-def _runge_kutta(
-    drive: Physical, departure, state: State, pull: Force, solved: Solution
-) -> tuple[Motion, Motion, Motion]:
+def _smooth(settings, v: Array, w: Array, theta: Array) -> list[Force]:
+    """Accelerations that depend on the motion alone."""
+    laws: tuple[Any, ...] = (quadratic_drag, (v, w)), (mass_offset, (v, w)), (turn_loss, (v, w)), (slope, (theta,))
+    return [law(*now, **settings[law.__name__]) for law, now in laws if law.__name__ in settings]
+
+
+def _runge_kutta(drive: Physical, departure, start: Motion, held: Force, half: Half, h: Array):
     """Rates of change of the departure at the start and the end of the substep, and the departure at its end."""
-    h = solved.step
-    middle, end = _nominal(solved.middle, state, pull), _nominal(solved.end, state, pull)
-    start = Motion(state.v, state.w, state.theta)
+    middle = _after(half, start, held)
+    end = _after(half, middle, held)
     k1 = departure(0.0, start)
-    k1_middle = _carry(solved.middle, k1)
-    k2 = departure(0.5, _sum(middle, (0.5 * h, k1_middle)))
+    carried = _after(half, k1)
+    k2 = departure(0.5, _sum(middle, (0.5 * h, carried)))
     k3 = departure(0.5, _sum(middle, (0.5 * h, k2)))
-    k3_end, k2_end = _carry(solved.middle, k3), _carry(solved.middle, k2)
-    k4 = departure(1.0, _sum(end, (h, k3_end)))
-    k1_end = _carry(solved.end, k1)
-    zero = Motion(*[jnp.zeros_like(state.v)] * 3)
-    d = _sum(zero, (h / 6.0, k1_end), (h / 3.0, k2_end), (h / 3.0, k3_end), (h / 6.0, k4))
+    k4 = departure(1.0, _sum(end, (h, _after(half, k3))))
+    inner = _after(half, _sum(carried, (2.0, k2), (2.0, k3)))
+    d = Motion(*((h / 6.0) * (a + b) for a, b in zip(inner, k4, strict=True)))
     decay_v, decay_w = _linear(drive, d.v, d.w)
     return k1, Motion(k4.v + decay_v, k4.w + decay_w, d.w), d
 
 
-def _travel(settings, state: State, pull: Force, path, solved: Solution) -> tuple[Array, Array]:
-    """Mean velocity in x and y over the substep, by Gauss nodes; the departure at them by Hermite's cubic."""
-    first, last, d = path
-    slip, h = settings["lateral_slip"]["slip"], solved.step
-    mean_x: Any = 0.0
-    mean_y: Any = 0.0
-    for weight, s, part in zip(GAUSS_WEIGHTS, GAUSS_NODES, solved.nodes, strict=True):
-        start, finish = h * s * (1.0 - s) ** 2, -h * s * s * (1.0 - s)
-        v, w, theta = _sum(_nominal(part, state, pull), (start, first), (s * s * (3.0 - 2.0 * s), d), (finish, last))
-        sine, cosine = sin_cos(theta)
-        side = lateral_slip(v, w, slip)
-        mean_x = mean_x + weight * (v * cosine - side * sine)
-        mean_y = mean_y + weight * (v * sine + side * cosine)
-    return mean_x, mean_y
+def _arrive(settings, drive: Physical, state: State, held: Force, path, half: Half, h: Array) -> State:
+    """The state at the end of the substep.
+
+    The velocity's integral is that of the quintic through its values at start, middle and end and its rates at both
+    ends; the departure in the middle is that of Hermite's cubic.
+    """
+    start = Motion(state.v, state.w, state.theta)
+    middle = _after(half, start, held)
+    end = _after(half, middle, held)
+    rates = [Force(*(a + b for a, b in zip(_linear(drive, now.v, now.w), held, strict=True))) for now in (start, end)]
+    if path is not None:
+        first, last, d = path
+        middle = _sum(middle, (0.5, d), (0.125 * h, first), (-0.125 * h, last))
+        end = _sum(end, (1.0, d))
+        rates = [Force(rates[0].along + first.v, rates[0].heading + first.w),
+                 Force(rates[1].along + last.v, rates[1].heading + last.w)]  # fmt: skip
+    slip = settings["lateral_slip"]["slip"] if "lateral_slip" in settings else None
+    (x0, y0), (x1, y1), (x2, y2) = (_velocity(now, slip) for now in (start, middle, end))
+    (a0, b0), (a2, b2) = (_velocity_rate(now, rate, slip) for now, rate in zip((start, end), rates, strict=True))
+    x = state.x + h * ((7.0 * (x0 + x2) + 16.0 * x1) / 30.0 + h / 60.0 * (a0 - a2))
+    y = state.y + h * ((7.0 * (y0 + y2) + 16.0 * y1) / 30.0 + h / 60.0 * (b0 - b2))
+    return State(x, y, end.theta, end.v, end.w)
 
 
-def _friction(settings, drive: Physical, state: State, pull: Force, d: Motion, lightness, solved: Solution) -> Force:
-    """The acceleration by dry friction, held over the substep."""
-    end = _nominal(solved.end, state, pull)
-    before = wheel_speeds(drive, state.v, state.w)
-    free = wheel_speeds(drive, end.v + d.v, end.w + d.w)
+def _velocity(now: Motion, slip: Array | None) -> tuple[Array, Array]:
+    sine, cosine = sin_cos(now.theta)
+    if slip is None:
+        return now.v * cosine, now.v * sine
+    side = lateral_slip(now.v, now.w, slip)
+    return now.v * cosine - side * sine, now.v * sine + side * cosine
+
+
+def _velocity_rate(now: Motion, rate: Force, slip: Array | None) -> tuple[Array, Array]:
+    """Acceleration in x and y."""
+    sine, cosine = sin_cos(now.theta)
+    ahead, left = rate.along, now.w * now.v
+    if slip is not None:
+        ahead = ahead - now.w * lateral_slip(now.v, now.w, slip)
+        left = left + lateral_slip(rate.along, now.w, slip) + lateral_slip(now.v, rate.heading, slip)
+    return ahead * cosine - left * sine, ahead * sine + left * cosine
+
+
+def _rubbed(settings, drive: Physical, start: Motion, pull: Force, d: Motion | None, lightness, half: Half) -> Force:
+    """The force with dry friction, held over the substep at whose end the departure is d."""
+    still = Motion(*[jnp.zeros_like(start.v)] * 3)
+
+    def at_end(begin: Motion, pushed: Force) -> Motion:
+        return _after(half, _after(half, begin, pushed), pushed)
+
+    end = at_end(start, pull)
+    if d is not None:
+        end = _sum(end, (1.0, d))
+    before, free = wheel_speeds(drive, start.v, start.w), wheel_speeds(drive, end.v, end.w)
+    scale = 1.0 if lightness is None else lightness
     columns = []
     for unit in (Wheels(1.0, 0.0), Wheels(0.0, 1.0)):
-        pushed = Force(*(lightness * f for f in force(drive, unit)))
-        start = (0.0, 0.0, pushed.along, pushed.heading)
-        columns.append(wheel_speeds(drive, weigh(solved.end.v, start), weigh(solved.end.w, start)))
+        reached = at_end(still, Force(*(scale * f for f in force(drive, unit))))
+        columns.append(wheel_speeds(drive, reached.v, reached.w))
     mobility = (columns[0].right, columns[1].right), (columns[0].left, columns[1].left)
-    coulomb, stiction = settings["coulomb_friction"], settings["stiction"]
 
     def level(n: Wheels) -> Wheels:
-        sides = zip(n, Wheels._fields, strict=True)
-        return Wheels(*(friction_level(m, coulomb[side], stiction[side], stiction["fade"]) for m, side in sides))
+        return Wheels(*(_level(settings, side, m) for m, side in zip(n, Wheels._fields, strict=True)))
 
     rubbed = force(drive, dry_friction(before, free, mobility, level))
-    return Force(-lightness * rubbed.along, -lightness * rubbed.heading)
+    return Force(pull.along - scale * rubbed.along, pull.heading - scale * rubbed.heading)
+
+
+def _level(settings, side: str, n: Array) -> Array:
+    """The friction of a wheel that slides at speed n, over what is in the settings of both kinds."""
+    coulomb = settings["coulomb_friction"][side] if "coulomb_friction" in settings else 0.0
+    if "stiction" not in settings:
+        return coulomb + jnp.zeros_like(n)
+    return friction_level(n, coulomb, settings["stiction"][side], settings["stiction"]["fade"])
 
 
 def _linear(drive: Physical, v: Array, w: Array) -> tuple[Array, Array]:
     """-rate * [v, w] + coupling * [w, v]."""
-    across = (0.0, 0.0) if drive.coupling is None else drive.coupling
-    return -drive.rate[0] * v + across[0] * w, -drive.rate[1] * w + across[1] * v
+    if drive.coupling is None:
+        return -drive.rate[0] * v, -drive.rate[1] * w
+    return -drive.rate[0] * v + drive.coupling[0] * w, -drive.rate[1] * w + drive.coupling[1] * v
 
 
 def to_wheels(drive: Physical, along: Array, heading: Array) -> Wheels:
@@ -166,15 +220,12 @@ def wheel_speeds(drive: Physical, v: Array, w: Array) -> Wheels:
     return to_wheels(drive, drive.rate[0] * v, drive.rate[1] * w)
 
 
-def _nominal(part: Part, state: State, pull: Force) -> Motion:
-    start = (state.v, state.w, pull.along, pull.heading)
-    return Motion(weigh(part.v, start), weigh(part.w, start), state.theta + weigh(part.turn, start))
-
-
-def _carry(part: Part, d: Motion) -> Motion:
-    """A departure after a part of the substep in which nothing is added to it."""
-    start = (d.v, d.w, 0.0, 0.0)
-    return Motion(weigh(part.v, start), weigh(part.w, start), d.theta + weigh(part.turn, start))
+def _after(half: Half, now: Motion, held: Force | None = None) -> Motion:
+    """A motion after half a substep under a held force; a departure, to which nothing is added meanwhile, without."""
+    if held is None:
+        half = Half(*(Response(r.v, r.w, None, None) for r in half))
+    start = (now.v, now.w, *(Force(0.0, 0.0) if held is None else held))
+    return Motion(weigh(half.v, start), weigh(half.w, start), now.theta + weigh(half.turn, start))
 
 
 def _sum(base: Motion, *terms: tuple[Any, Motion]) -> Motion:

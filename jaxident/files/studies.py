@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from jaxident.effects.apply import sized, with_effects
+from jaxident.effects.catalogue import CATALOGUE
 from jaxident.errors import InputError
 from jaxident.files.models import load_model
 from jaxident.files.schema import take_keys, take_list, take_number, take_object, take_text
@@ -40,6 +42,9 @@ model = "published"         # a robot that comes with the program, or a model fi
 # scale = { dead_zone = [0.5, 1.0, 2.0], rate = 1.0 }     # grid: every combination becomes a robot
 # spread = { gain = 0.2 }   # each seed draws its own robot, this far from the model at most (relative, uniform)
                             # scale and spread take rate, gain, coupling, dead_zone
+# effects = [{}, { motor_lag = 0.5 }, { motor_lag = 1.0 }, { coulomb_friction = { right = 0.05, left = 0.04 } }]
+                            # each set becomes a robot; a number is the strength in typical sizes, else give the
+                            # parameters; `jaxident effects` lists them; {} is the robot without
 
 [[estimators]]
 method = "batch"            # PAPER section VI
@@ -109,7 +114,7 @@ def study_from_dict(content: Any, name: str = "study", *, seed: int = 0) -> Stud
 
 def _candidates(entry: Any, where: str, folder: str) -> list[Candidate]:
     """The robots of one entry, one for each point of its grid."""
-    found = take_keys(entry, where, ("model",), ("name", "scale", "spread"))
+    found = take_keys(entry, where, ("model",), ("name", "scale", "spread", "effects"))
     model, title = _model(found["model"], f"{where}: model", folder)
     title = _if_given(found["name"], take_text, f"{where}: name") or title
     scale = take_keys(found["scale"] or {}, f"{where}: scale", (), PARTS)
@@ -124,7 +129,37 @@ def _candidates(entry: Any, where: str, folder: str) -> list[Candidate]:
     if empty is not None:
         raise InputError(f"{where}: scale.{empty}: is empty; it needs at least one entry")
     points = [dict(zip(grid, point, strict=True)) for point in itertools.product(*grid.values())]
-    return [Candidate(_label(title, point), _scaled(model, point), widths) for point in points]
+    sets = [("", model)]
+    if found["effects"] is not None:
+        given = take_list(found["effects"], f"{where}: effects")
+        sets = [_with_set(model, one, f"{where}: effects[{k}]") for k, one in enumerate(given)]
+        if not sets:
+            raise InputError(f"{where}: effects: is empty; it needs at least one set, as [{{}}]")
+    return [
+        Candidate(_label(title, point) + more, _scaled(each, point), widths) for more, each in sets for point in points
+    ]
+
+
+def _with_set(model: Model, entry: Any, where: str) -> tuple[str, Model]:
+    """The model with a set of effects, and what that adds to its name."""
+    names, effects = "", []
+    for name, size in take_object(entry, where).items():
+        if name not in CATALOGUE:
+            raise InputError(f"{where}: unknown effect {name!r}; the catalogue has {', '.join(CATALOGUE)}")
+        if isinstance(size, dict):
+            values = {key: take_number(value, f"{where}: {name}.{key}") for key, value in size.items()}
+            names += f" + {name} " + " ".join(f"{key}={value:g}" for key, value in values.items())
+        else:
+            strength = take_number(size, f"{where}: {name}")
+            if strength <= 0.0:
+                raise InputError(f"{where}: {name}: is {strength:g}; a strength is above 0, in typical sizes")
+            values = sized(CATALOGUE[name], strength)
+            names += f" + {name} x{strength:g}"
+        effects.append((name, values))
+    try:
+        return names, with_effects(model, effects)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
 
 
 def _model(value: Any, where: str, folder: str) -> tuple[Model, str]:

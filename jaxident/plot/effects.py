@@ -8,6 +8,8 @@ from matplotlib.axes import Axes
 
 from jaxident.plot import style
 
+_DOTS: dict[str, Any] = {"linestyle": "none", "marker": ".", "markersize": 1.6, "alpha": 0.7, "markeredgewidth": 0.0}
+
 
 def effect_signature(
     title: str,
@@ -31,18 +33,12 @@ def effect_signature(
         for name, values, colour in drawn:
             if sizes[name] > 1e-6:
                 unit = "mrad" if name == "heading" else "mm"
-                dots: dict[str, Any] = {
-                    "linestyle": "none",
-                    "marker": ".",
-                    "markersize": 1.6,
-                    "alpha": 0.7,
-                    "markeredgewidth": 0.0,
-                }
                 text = f"{name}, ±{sizes[name]:.3g} {unit}"
-                ax.plot(regressor[name], values / sizes[name], color=colour, label=text, rasterized=True, **dots)
-        ax.set_ylim(-1.15, 1.15)
-        ax.set_yticks([-1.0, 0.0, 1.0], labels=[])
+                ax.plot(regressor[name], values / sizes[name], color=colour, label=text, rasterized=True, **_DOTS)
+        ax.set(ylim=(-1.15, 1.15))
+        ax.set_yticks([-1.0, 0.0, 1.0], labels=["−1", "0", "1"] if ax is axes[0] else [])
         ax.set_xlabel(label, labelpad=1.0)
+    axes[0].set_ylabel("over its largest", labelpad=1.0)
     axes[0].set_title(title.replace("_", " "), loc="left", fontsize=style.TEXT, fontweight="bold", pad=3.0)
     handles, labels = axes[0].get_legend_handles_labels()
     place: Any = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.98), "ncols": 3, "markerscale": 4.0}

@@ -68,16 +68,24 @@ def error_curves(
     return ax
 
 
-def heat_map(values: Any, *, rows: Sequence[str], columns: Sequence[str], label: str, ax: Axes | None = None) -> Axes:
+def heat_map(
+    values: Any,
+    *,
+    rows: Sequence[str],
+    columns: Sequence[str],
+    label: str,
+    ax: Axes | None = None,
+    limits: tuple[float, float] | None = None,
+) -> Axes:
     """Positive values (rows, columns) as colours on a logarithmic scale, each written into its field; NaN is empty.
 
-    label: what the values are, with their unit, above the map.
+    label: what the values are, with their unit, above the map. limits: ends of the colours, by default of the values.
     """
     ax = style.axes_or_new(ax)
     values = np.asarray(values, float)
     known = values[np.isfinite(values) & (values > 0.0)]
     low, high = (np.min(known), np.max(known)) if known.size else (1.0, 10.0)
-    norm = LogNorm(low, max(high, 1.01 * low))
+    norm = LogNorm(*limits, clip=True) if limits else LogNorm(low, max(high, 1.01 * low))
     ax.imshow(np.where(values > 0.0, values, np.nan), cmap=MAP, norm=norm, aspect="auto")
     for (row, column), value in np.ndenumerate(values):
         if np.isfinite(value):

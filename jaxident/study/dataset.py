@@ -118,7 +118,9 @@ def _parts(model: Any) -> dict[str, Any]:
     drive, noise = model.dynamics, model.noise
     lists = {key: None if part is None else np.asarray(part, float).tolist() for key, part in drive._asdict().items()}
     slip = None if noise is None else [float(noise.slip_along), float(noise.slip_heading)]
-    return lists | {"dead_zone": np.asarray(model.dead_zone, float).tolist(), "slip": slip}
+    plain = lists | {"dead_zone": np.asarray(model.dead_zone, float).tolist(), "slip": slip}
+    effects = {effect.name: {key: float(v) for key, v in effect.parameters.items()} for effect in model.effects}
+    return plain | ({"effects": effects} if effects else {})
 
 
 def _unit(parameter: str) -> str:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+from jaxident.effects.checks import check_delay, check_effects
 from jaxident.errors import InputError
 from jaxident.robot.excitation import EXCITATIONS
 from jaxident.robot.model import Model, require_physical
@@ -22,8 +23,8 @@ HEADING_PER_POSITION = 10.0
 
 
 class Candidate(NamedTuple):
-    """A robot of the study: a name, a model in physical parameters, and by what part of itself, at most, each of PARTS
-    departs from it, drawn anew for every seed (uniform, the same for all other axes)."""
+    """A robot of the study: a name, a model in physical parameters with or without effects, and by what part of itself,
+    at most, each of PARTS departs from it, drawn anew for every seed (uniform, the same for all other axes)."""
 
     name: str
     model: Model
@@ -61,6 +62,11 @@ class Study(NamedTuple):
         return (*map(len, axes), self.seeds)
 
     @property
+    def effects(self) -> frozenset[str]:
+        """Names of the effects that any of the robots has."""
+        return frozenset(effect.name for candidate in self.robots for effect in candidate.model.effects)
+
+    @property
     def trials(self) -> int:
         """How many logs are simulated; each is seen by every estimator."""
         return math.prod(self.shape)
@@ -77,7 +83,7 @@ def check_study(study: Study, where: str = "study") -> None:
     if study.correlation_time is not None and not study.correlation_time > 0.0:
         raise InputError(f"{where}: correlation_time: is {study.correlation_time:g}; it should be above 0, or left out")
     for candidate in study.robots:
-        _check_candidate(candidate, f"{where}: robot {candidate.name!r}")
+        _check_candidate(candidate, f"{where}: robot {candidate.name!r}", (min(study.samples) - 1) * min(study.period))
     for choice in study.estimators:
         check_choice(choice, f"{where}: estimator {choice.name!r}")
 
@@ -109,13 +115,14 @@ def _check_axis(values: Sequence[Any], where: str) -> None:
         raise InputError(f"{where}: {twice!r} stands there twice; keep one")
 
 
-def _check_candidate(candidate: Candidate, where: str) -> None:
+def _check_candidate(candidate: Candidate, where: str, duration: float) -> None:
+    """`duration` [s]: that of the shortest run."""
     try:
         require_physical(candidate.model)
+        check_effects(candidate.model.effects)
+        check_delay(candidate.model.effects, duration)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
-    if candidate.model.effects:
-        raise InputError(f"{where}: effects: studies run nominal models only")
     bad = next((width for width in candidate.spread if not 0.0 <= width < 1.0), None)
     if bad is not None:
         raise InputError(f"{where}: spread: {bad:g} should be at least 0 and below 1")

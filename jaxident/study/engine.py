@@ -10,11 +10,13 @@ import jax
 import numpy as np
 
 from jaxident.array_types import Wheels
+from jaxident.effects.catalogue import to_vector
 from jaxident.numerics import require_float64
 from jaxident.robot.excitation import EXCITATIONS
 from jaxident.robot.model import require_physical
 from jaxident.study.batch import in_parallel
 from jaxident.study.design import AXES, PARTS, Study
+from jaxident.study.estimators import runs_alone
 from jaxident.study.trial import Cell, Outcome, Plan, Recording, Robot, commands, record, run_trial
 
 BLOCK = {"cpu": 50}
@@ -84,7 +86,7 @@ def run_one(study: Study, number: int) -> tuple[Recording, Outcome]:
     cell = jax.tree.map(lambda leaf: leaf[0], cells(study, index))
     command = Wheels(*(u[0] for u in _commands(study, index, cells(study, index))))
     outcome = _run(study, np.repeat(index, block_size(study), axis=1), 1)
-    recording = jax.jit(record)(jax.random.key(study.seed), cell, command)
+    recording = jax.jit(record, static_argnames="effects")(jax.random.key(study.seed), cell, command, study.effects)
     return jax.tree.map(np.asarray, recording), Outcome(*(part[0] for part in outcome))
 
 
@@ -130,6 +132,8 @@ def _run(study: Study, index: np.ndarray, cores: int | None) -> Outcome:
         return jax.tree.map(np.asarray, program(base, *_spread((where, _commands(study, block, where)))))
 
     blocks = [(block,) for block in np.split(padded, padded.shape[1] // size, axis=1)]
+    if any(runs_alone(choice) for choice in study.estimators):
+        cores = 1
     outcomes = in_parallel(work, blocks, cores)
     return Outcome(*(np.concatenate(part)[:count] for part in zip(*outcomes, strict=True)))
 
@@ -144,7 +148,7 @@ def _program(study: Study, size: int) -> Callable[[int], Callable[..., Outcome]]
     cell = cells(study, np.zeros((len(AXES), size), int))
     leaves, tree = jax.tree.flatten(cell)
     shapes = tuple((leaf.shape, str(leaf.dtype)) for leaf in leaves)
-    return lambda samples: _compiled(Plan(samples, study.estimators), tree, shapes)
+    return lambda samples: _compiled(Plan(samples, study.estimators, study.effects), tree, shapes)
 
 
 @functools.lru_cache(maxsize=64)
@@ -181,4 +185,5 @@ def _robots(study: Study) -> Robot:
         np.array([model.dead_zone for model in models], float),
         np.array(slips, float) if np.any(np.array(slips, float)) else None,
         np.array([candidate.spread for candidate in study.robots], float).reshape(-1, len(PARTS)),
+        np.array([to_vector(model.effects) for model in models], float) if study.effects else None,
     )

@@ -14,6 +14,7 @@ import jax.numpy as jnp
 from jaxident.array_types import Array, Increment, Pose, Wheels
 from jaxident.errors import InputError
 from jaxident.estimation import recursive
+from jaxident.estimation.batch_covariance import batch_covariance
 from jaxident.estimation.identify import D_MAX_SHARE, SETUP_SAMPLES, SETUP_SHARE, SMALLEST_LOG, parameter_covariance
 from jaxident.estimation.initialise import Setup, initialise
 from jaxident.estimation.maximum_likelihood import fit_runs
@@ -73,10 +74,16 @@ class Setting(NamedTuple):
 
 
 class Method(NamedTuple):
-    """run(sight, settings) -> Finding, and the settings it takes."""
+    """run(sight, settings) -> Finding, and the settings it takes.
+
+    alone: no two of its programs may run at once in a process. Its eigenvalues come from LAPACK, whose batched call
+    hands its work to XLA's threads and waits for them, on one of these itself; with as many programs as threads, all
+    wait for ever.
+    """
 
     run: Callable[[Sight, dict[str, Any]], Finding]
     settings: dict[str, Setting]
+    alone: bool = False
 
 
 class Choice(NamedTuple):
@@ -91,6 +98,11 @@ def settings_of(choice: Choice) -> dict[str, Any]:
     """All settings of a choice, defaults included."""
     known = METHODS[choice.method].settings
     return {key: setting.default for key, setting in known.items()} | dict(choice.settings)
+
+
+def runs_alone(choice: Choice) -> bool:
+    """Whether programs with this estimator run one at a time in a process; see `Method`."""
+    return METHODS[choice.method].alone
 
 
 def check_choice(choice: Choice, where: str) -> None:
@@ -134,7 +146,7 @@ def batch(sight: Sight, settings: dict[str, Any]) -> Finding:
     """PAPER section VI on the first rows (default: all): linear least squares, then the nonlinear cost (21)."""
     rows = len(sight.log.t)
     first, setup, variance = _start(sight, settings, settings["setup_samples"] or rows, 1.0)
-    return _finding(first, setup, variance)
+    return _finding(first, setup, variance, batch_covariance)
 
 
 def recursively(sight: Sight, settings: dict[str, Any]) -> Finding:
@@ -144,7 +156,7 @@ def recursively(sight: Sight, settings: dict[str, Any]) -> Finding:
     first, setup, variance = _start(sight, settings, count, settings["forgetting"])
     late = recursive.tail(sight.observations, min(rows, count) - 2)
     if not len(late.command.right):
-        return _finding(first, setup, variance)
+        return _finding(first, setup, variance, batch_covariance)
 
     def body(carry, sample):
         estimate, squares = carry
@@ -181,8 +193,8 @@ def _start(sight: Sight, settings: dict[str, Any], count: int, forgetting: float
     return first, setup, jnp.sum(left**2, axis=1) / spare
 
 
-def _finding(last: recursive.Estimate, setup: Setup, variance: Array) -> Finding:
-    covariance = parameter_covariance(last, Increment(variance[0], variance[1]))
+def _finding(last: recursive.Estimate, setup: Setup, variance: Array, covariance_of=parameter_covariance) -> Finding:
+    covariance = covariance_of(last, Increment(variance[0], variance[1]))
     deviation = jnp.sqrt(jnp.maximum(jnp.diagonal(covariance), 0.0))
     reason = jnp.where(setup.ok, FOUND, NO_START)
     return Finding(difference_vector(*recursive.parameters(last)), deviation, reason)
@@ -208,6 +220,6 @@ METHODS = {
         recursively,
         _PAPER | {"forgetting": Setting(1.0, _number(0.0, 1.0), "a number above 0 and at most 1")},
     ),
-    "maximum-likelihood": Method(likelihood, _LIKELIHOOD),
+    "maximum-likelihood": Method(likelihood, _LIKELIHOOD, alone=True),
 }
 """Every estimator by name."""

@@ -1,16 +1,14 @@
 """Example logs: a robot drawn near the published one, recorded by an overhead camera."""
 
 import dataclasses
-import math
 
 import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array
-from jaxident.effects.apply import with_effects
+from jaxident.effects.apply import sized, with_effects
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.checks import check_effects
-from jaxident.effects.entry import Parameter
 from jaxident.log import Log, join
 from jaxident.robot.drive import Physical
 from jaxident.robot.model import Effect, Model, Provenance, require_physical
@@ -56,15 +54,7 @@ def draw_effect(key: Array, robot: Model, name: str | None) -> Model:
     check_effects((Effect(name, {}),))
     entry = CATALOGUE[name]
     factor = float(jax.random.uniform(key_size, minval=0.5, maxval=1.5))
-    sizes = {p.name: p.typical if p.shape else _scaled(p, factor) for p in entry.parameters}
-    return with_effects(robot, [(name, sizes)])
-
-
-def _scaled(parameter: Parameter, factor: float) -> float:
-    """A typical size, its distance from neutral times a factor; where neutral is infinite, the size over it."""
-    if math.isinf(parameter.neutral):
-        return parameter.typical / factor
-    return parameter.neutral + factor * (parameter.typical - parameter.neutral)
+    return with_effects(robot, [(name, sized(entry, factor))])
 
 
 def example_runs(key: Array, robot: Model) -> list[Log]:

@@ -3,8 +3,9 @@
     seed_key = fold_in(key(study.seed), seed)       the robot, where it is drawn
     run_key  = fold_in(seed_key, excitation)        the excitation's draws and the unit noise
 
-Noise level, amplitude, robot and estimator are in no key: all of them see the same random numbers (common random
-numbers), so that differences between them are sharp. No trial depends on which others a study holds.
+Noise level, amplitude, robot (its effects included) and estimator are in no key: all of them see the same random
+numbers (common random numbers), so that differences between them are sharp. No trial depends on which others a study
+holds.
 """
 
 import functools
@@ -14,6 +15,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import AT_REST, Array, Pose, Wheels
+from jaxident.effects.full import disturb, run_undisturbed, substeps_for
 from jaxident.robot.drive import Physical
 from jaxident.robot.excitation import EXCITATIONS
 from jaxident.robot.model import Model, difference_vector
@@ -24,7 +26,8 @@ from jaxident.study.estimators import Choice, estimate, see
 
 class Robot(NamedTuple):
     """Parts of a robot: rate (2,), gain (2, 2), coupling (2,) or None, dead_zone (2,), slip (2,) along and in heading
-    or None; spread (4,): the largest relative departure of each part, drawn anew for each seed."""
+    or None; spread (4,): the largest relative departure of each part, drawn anew for each seed; effects (parameters,):
+    the catalogue's vector, or None where no robot of the study has any."""
 
     rate: Any
     gain: Any
@@ -32,6 +35,7 @@ class Robot(NamedTuple):
     dead_zone: Any
     slip: Any
     spread: Any
+    effects: Any
 
 
 class Cell(NamedTuple):
@@ -49,10 +53,11 @@ class Cell(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """What the compiled program of a trial is fixed to."""
+    """What the compiled program of a trial is fixed to; effects: names of those that any robot of the study has."""
 
     samples: int
     estimators: tuple[Choice, ...]
+    effects: frozenset[str]
 
 
 class Outcome(NamedTuple):
@@ -66,7 +71,8 @@ class Outcome(NamedTuple):
 
 
 class Recording(NamedTuple):
-    """What a trial's estimators are given, and what is true: commands and poses (samples,), the robot."""
+    """What a trial's estimators are given, and what is true: commands and poses (samples,), the robot. The exact poses
+    hold everything but the camera's random errors."""
 
     command: Wheels
     measured: Pose
@@ -93,14 +99,20 @@ def commands(base: Array, cells: Cell, kind: str, samples: int, hold: int) -> Wh
     return jax.vmap(one)(cells)
 
 
-def record(base: Array, cell: Cell, command: Wheels) -> Recording:
-    """Simulate one trial under given commands (samples,), and let the camera look."""
-    key_robot, _, key_noise = seed_keys(base, cell)
+def record(base: Array, cell: Cell, command: Wheels, effects: frozenset[str] = frozenset()) -> Recording:
+    """Simulate one trial under given commands (samples,), and let the camera look: by the nominal simulator, or the
+    full one where a robot of the study has `effects` (their names)."""
+    key_robot, _, key = seed_keys(base, cell)
     robot = draw_robot(key_robot, cell)
-    unit = draw_noise(key_noise, len(command.right))
-    exact = run_physical(robot, command, cell.period, AT_REST, unit).pose
     law = Noise(cell.position, cell.heading, cell.correlation_time)
-    return Recording(command, observe(exact, law, unit, cell.period), exact, robot)
+    if not effects:
+        unit = draw_noise(key, len(command.right))
+        exact = run_physical(robot, command, cell.period, AT_REST, unit).pose
+        return Recording(command, observe(exact, law, unit, cell.period), exact, robot)
+    t, vector = cell.period * jnp.arange(len(command.right)), cell.robot.effects
+    exact = run_undisturbed(robot.dynamics, robot.dead_zone, vector, t, command, AT_REST, noise=robot.noise, key=key,
+                            substeps=substeps_for(effects), parts=effects)  # fmt: skip
+    return Recording(command, disturb(exact, vector, t, noise=law, key=key, parts=effects), exact, robot)
 
 
 def draw_robot(key: Array, cell: Cell) -> Model:
@@ -117,7 +129,7 @@ def draw_robot(key: Array, cell: Cell) -> Model:
 
 def run_trial(plan: Plan, base: Array, cell: Cell, command: Wheels) -> Outcome:
     """One trial: what every estimator makes of one noisy recording."""
-    made = record(base, cell, command)
+    made = record(base, cell, command, plan.effects)
     moves = jnp.any(jnp.stack([jnp.ptp(column) for column in made.exact]) > 0.0)
     sight = see(made.command, made.measured, cell.period)
     found = [estimate(choice, sight, moves) for choice in plan.estimators]

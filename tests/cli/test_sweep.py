@@ -43,6 +43,7 @@ def test_writes_what_it_says(swept):
     assert len(rows) == 2 * 12
     assert {row["parameter"] for row in rows} >= {"alpha_1", "dead_zone_l"}
     assert all(float(row["rmse"]) >= abs(float(row["bias"])) for row in rows)
+    assert all(float(row["rmse_over_bound"]) > 0.1 for row in rows)
     page = (swept / "out" / "index.html").read_text()
     assert "Error against noise" in page
     assert page.count("<img") >= 9

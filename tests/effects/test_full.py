@@ -7,10 +7,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from support.effect_robots import DRIVE, ROBOT, START, drive_log, full, poses, typical
+from support.effect_robots import DRIVE, ROBOT, START, WIDTH, drive_log, full, poses, typical
 
 import jaxident as ji
-from jaxident.effects import CATALOGUE, NEUTRAL, ORDER, to_vector
+from jaxident.effects import CATALOGUE, NEUTRAL, ORDER, run_full, to_vector
 from jaxident.log import join
 from jaxident.robot.model import Effect
 from jaxident.robot.noise import Noise
@@ -157,3 +157,11 @@ def test_the_last_command_may_be_missing():
     log = SHORT._replace(u_r=np.append(SHORT.u_r[:-1], np.nan), u_l=np.append(SHORT.u_l[:-1], np.nan))
     model = typical("transport_delay", "stiction")
     np.testing.assert_array_equal(poses(ji.simulate(model, log)), poses(ji.simulate(model, SHORT)))
+
+
+def test_a_program_of_few_parts_is_the_whole_one():
+    """The others at neutral; a delay alone takes no substeps, and its nominal rule for the position is coarser."""
+    for names in (("transport_delay", "direction_gain"), ("payload_change", "stiction", "camera_scale"), ("slope",)):
+        vector = to_vector([Effect(name, CATALOGUE[name].typical()) for name in names])
+        part = run_full(DRIVE, WIDTH, vector, SHORT.t, SHORT.command, START, parts=frozenset(names))
+        np.testing.assert_allclose(np.stack(part, axis=1), full(vector, SHORT, None), rtol=1e-9, atol=1e-9)

@@ -3,11 +3,12 @@
 import jax
 import numpy as np
 import pytest
-from support.effect_robots import ROBOT, START, drive_log, poses, typical
+from support.effect_robots import ROBOT, START, drive_log, full, poses, typical
 from support.reference_effects import simulate_reference
 
 import jaxident as ji
-from jaxident.effects import CATALOGUE
+from jaxident.effects import CATALOGUE, to_vector
+from jaxident.effects.full import _keys, substeps_for
 
 PARAMETERS = ROBOT.physical._asdict() | {"dead_zone": ROBOT.dead_zone}
 CORNERS = ("coulomb_friction", "stiction", "backlash", "input_rate_limit")
@@ -28,12 +29,24 @@ def reference(names, log, **options):
     )
 
 
+def tolerance(names):
+    """200 samples: position to 1e-6 m, with corners to 1e-4 m, heading to as many radians."""
+    return 1e-4 if any(name in CORNERS for name in names) else 1e-6
+
+
 @pytest.mark.parametrize("names", SETS, ids="+".join)
 def test_the_trajectory_is_that_of_the_reference(names):
-    """200 samples: position to 1e-6 m, with corners to 1e-4 m, heading to as many radians."""
+    """In the program that holds all effects, which is compiled once."""
     log = drive_log()
-    error = np.abs(poses(ji.simulate(typical(*names), log, start=START)) - reference(names, log))
-    assert error.max() < (1e-4 if any(name in CORNERS for name in names) else 1e-6)
+    found = full(to_vector(typical(*names).effects), log, substeps=substeps_for(frozenset(names)))
+    assert np.abs(found - reference(names, log)).max() < tolerance(names)
+
+
+@pytest.mark.parametrize("names", [pytest.param(s, marks=[pytest.mark.slow] * (len(s) == 1)) for s in SETS])
+def test_a_program_of_these_effects_alone_does_the_same(names):
+    log = drive_log()
+    found = poses(ji.simulate(typical(*names), log, start=START))
+    assert np.abs(found - reference(names, log)).max() < tolerance(names)
 
 
 @pytest.mark.parametrize("names", [("transport_delay",), ("payload_change",), ("motor_lag", "slope")], ids="+".join)
@@ -57,3 +70,23 @@ def test_random_effects_have_the_reference_s_statistics(name):
     error = np.sqrt(sum(np.var(each, axis=0, ddof=1) / 64 for each in squares))
     assert np.all(squares[1].mean(axis=0) > 0)
     assert np.all(np.abs(squares[0].mean(axis=0) - squares[1].mean(axis=0)) < 4.0 * error)
+
+
+class _Replay:
+    """A generator whose uniform draws are given."""
+
+    def __init__(self, draws):
+        self.draws = iter(draws)
+
+    def random(self):
+        return float(next(self.draws))
+
+
+def test_lost_commands_are_those_of_the_reference_row_by_row():
+    """With the same draws, of which the first row needs none."""
+    log, key = drive_log(), jax.random.key(4)
+    draws = np.asarray(jax.random.uniform(_keys(key)[0], (len(log.t),)))
+    expected = reference(("lost_commands",), log, rng=_Replay(draws[1:]))
+    found = poses(ji.simulate(typical("lost_commands"), log, start=START, key=key))
+    assert np.abs(found - expected).max() < 1e-6
+    assert np.abs(found - reference((), log)).max() > 1e-2

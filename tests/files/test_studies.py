@@ -20,7 +20,8 @@ def test_the_example_reads_with_and_without_its_comments():
     study = parse_study(EXAMPLE, "study.toml")
     assert study.shape == (2, 1, 1, 1, 1, 4, 50)
     every = parse_study(re.sub(r"^# (?=\w+ = )", "", EXAMPLE, flags=re.MULTILINE), "study.toml")
-    assert len(every.robots) == 3
+    assert len(every.robots) == 3 * 4
+    assert every.effects == {"motor_lag", "coulomb_friction"}
     assert every.period == (0.0333, 0.1)
     assert every.correlation_time == 0.5
 
@@ -42,6 +43,24 @@ def test_a_grid_of_robots(tmp_path):
     )
 
 
+def test_sets_of_effects_become_robots():
+    sets = "[{}, { motor_lag = 0.5, slope = 2 }, { stiction = { right = 0.1 } }, { input_saturation = 2 }]"
+    text = SMALL_TOML.replace(
+        "spread = { gain = 0.2, dead_zone = 0.1 }", f"scale = {{ rate = [1, 2] }}, effects = {sets}"
+    )
+    study = parse_study(text, "study.toml")
+    assert [robot.name for robot in study.robots[::2]] == [
+        "published ratex1", "published ratex1 + motor_lag x0.5 + slope x2", "published ratex1 + stiction right=0.1",
+        "published ratex1 + input_saturation x2",
+    ]  # fmt: skip
+    found = [{effect.name: effect.parameters for effect in robot.model.effects} for robot in study.robots[1::2]]
+    assert found[0] == {}
+    assert found[1]["motor_lag"] == {"time_constant": 0.03}
+    assert found[1]["slope"] == {"acceleration": 0.1, "direction": 0.7}  # the direction is a shape
+    assert found[2:] == [{"stiction": {"right": 0.1}}, {"input_saturation": {"level": 0.3}}]
+    assert describe(study)["robots"][2]["effects"] == found[1]
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
@@ -60,6 +79,11 @@ def test_a_grid_of_robots(tmp_path):
         ("gain = 0.2", "gain = 2.0", ["spread", "below 1"]),
         ('"published"', '"nobody"', ["robots[0]", "nobody", "no such file"]),
         ("spread = { gain = 0.2, dead_zone = 0.1 }", "scale = { gain = [] }", ["scale.gain", "empty"]),
+        ("spread = {", "effects = [{ lag = 1.0 }], spread = {", ["robots[0]: effects[0]", "unknown effect 'lag'"]),
+        ("spread = {", "effects = [{ motor_lag = 0 }], spread = {", ["effects[0]: motor_lag", "above 0"]),
+        ("spread = {", "effects = [{ motor_lag = { tau = 1 } }], spread = {", ["effects[0]", "'tau'"]),
+        ("spread = {", "effects = [{ transport_delay = { delay = 9 } }], spread = {", ["delay is 9 s", "longer"]),
+        ("spread = {", "effects = [], spread = {", ["effects", "empty"]),
         ("hold = 3", "hold = = 3", ["not TOML", "line"]),
     ],
 )

@@ -39,8 +39,8 @@ def test_shape_counts_trials():
         ({"robots": (Candidate("wide", ROBOT, (1.0, 0.0, 0.0, 0.0)),)}, ["wide", "spread", "below 1"]),
         ({"robots": (Candidate("free", dataclasses.replace(ROBOT, dynamics=ROBOT.difference)),)}, ["free", "physical"]),
         (
-            {"robots": (Candidate("odd", dataclasses.replace(ROBOT, effects=(Effect("backlash", {}),))),)},
-            ["odd", "effects"],
+            {"robots": (Candidate("odd", dataclasses.replace(ROBOT, effects=(Effect("backlash", {"right": -1.0}),))),)},
+            ["odd", "right is -1"],
         ),
     ],
 )

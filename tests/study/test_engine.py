@@ -3,11 +3,14 @@
 import jax
 import numpy as np
 import pytest
-from support.studies import SMALL
+from support.studies import ROBOT, SMALL
 
+from jaxident.effects.apply import sized, with_effects
+from jaxident.effects.catalogue import CATALOGUE
 from jaxident.robot.excitation import staircase
-from jaxident.study import engine
+from jaxident.study import engine, trial
 from jaxident.study.dataset import study_arrays
+from jaxident.study.design import AXES
 from jaxident.study.engine import chunk_shape, chunks, pieces, run_chunk, run_one
 from jaxident.study.estimators import AT_REST, FOUND, NOT_FINITE, REASONS, Finding, Method
 from jaxident.study.statistics import summarise
@@ -106,3 +109,31 @@ def test_what_is_not_finite_has_failed():
         estimators.METHODS = known
     assert int(found.reason) == NOT_FINITE
     assert np.all(np.isnan(found.estimate))
+
+
+def test_effects_act_on_their_robots_alone():
+    """At no noise a robot without effects and one with a neutral effect are the nominal one; the others move apart."""
+    names = ("motor_lag", "marker_offset")
+    robots = [SMALL.robots[0]] + [
+        SMALL.robots[0]._replace(
+            name=f"{name} {size}", model=with_effects(ROBOT, [(name, sized(CATALOGUE[name], size))])
+        )
+        for name in names
+        for size in (1e-12, 1.0)
+    ]
+    study = SMALL._replace(robots=tuple(robots))
+    index = np.zeros((len(AXES), len(robots)), int)
+    index[AXES.index("robot")] = np.arange(len(robots))
+    cells = engine.cells(study, index)
+    base, rows = jax.random.key(study.seed), study.samples[0]
+    command = trial.commands(base, cells, "staircase", rows, study.hold)
+    made = jax.jit(jax.vmap(lambda cell, u: trial.record(base, cell, u, study.effects)))(cells, command)
+    alone = jax.jit(jax.vmap(lambda cell, u: trial.record(base, cell, u)))(cells, command)
+    for kind in ("exact", "measured"):
+        ours, nominal = (np.stack(getattr(each, kind), axis=-1) for each in (made, alone))
+        for robot in (0, 1, 3):
+            np.testing.assert_allclose(ours[robot], nominal[robot], rtol=1e-9, atol=1e-10)
+        for robot in (2, 4):
+            assert np.abs(ours[robot] - nominal[robot]).max() > 1e-3
+    noise = (np.stack(each.measured, axis=-1) - np.stack(each.exact, axis=-1) for each in (made, alone))
+    np.testing.assert_allclose(*noise, atol=1e-12)

@@ -1,0 +1,78 @@
+"""The Cramer-Rao bound of a study's cells: what no unbiased estimator can beat on the same commands."""
+
+import functools
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import xarray
+
+from jaxident.array_types import AT_REST, Array, Pose, Wheels
+from jaxident.estimation.parameters import Law, Robot, to_vector
+from jaxident.estimation.precision import bound_covariance, difference_covariance
+from jaxident.estimation.runs import Runs
+from jaxident.numerics import require_float64
+from jaxident.robot.model import DIFFERENCE_ORDER, require_physical
+from jaxident.robot.noise import Noise
+from jaxident.study.design import AXES, Study
+from jaxident.study.engine import cells
+from jaxident.study.statistics import CELLS
+from jaxident.study.trial import Cell, commands, draw_robot, seed_keys
+
+SEEDS = 8
+"""Seeds of a cell whose bounds are averaged (as variances): commands and, where drawn, robots differ."""
+
+MOST_CELLS = 500
+
+
+def bounds(study: Study) -> xarray.DataArray | None:
+    """Smallest standard deviation possible on the axes of a summary's cells and `parameter`, in DIFFERENCE_ORDER.
+
+    NaN without noise and for robots with effects, of which no estimator knows. None for a study of more than
+    MOST_CELLS cells at one noise level, or with a camera that makes no error in heading. Needs double precision.
+    """
+    require_float64("bounds")
+    if not study.heading_per_position > 0.0 or np.prod(study.shape[:-2]) > MOST_CELLS:
+        return None
+    noise, found = np.asarray(study.noise, float), np.full((*study.shape[:-1], len(DIFFERENCE_ORDER)), np.nan)
+    slip = any(
+        c.model.noise is not None and c.model.noise.slip_along + c.model.noise.slip_heading for c in study.robots
+    )
+    for place in np.ndindex(study.shape[:-2]):
+        if study.robots[place[CELLS.index("robot")]].model.effects:
+            continue
+        levels = np.flatnonzero(noise) if slip else np.flatnonzero(noise)[:1]
+        for level in levels:
+            found[(*place, level)] = _deviation(study, (*place, level), bool(slip))
+        if not slip and len(levels):  # without slip the bound grows as the noise does
+            found[place] = found[(*place, levels[0])] * np.where(noise > 0.0, noise / noise[levels[0]], np.nan)[:, None]
+    return xarray.DataArray(found, dims=(*CELLS, "parameter"))
+
+
+def _deviation(study: Study, place: tuple[int, ...], slip: bool) -> np.ndarray:
+    """The bound (12,) of one cell: root of the mean variance over its first seeds."""
+    count = min(SEEDS, study.seeds)
+    index = np.stack([np.full(count, k) for k in place] + [np.arange(count)])
+    where, base = cells(study, index), jax.random.key(study.seed)
+    kind, rows = study.excitations[place[AXES.index("excitation")]], study.samples[place[AXES.index("samples")]]
+    law = Law(coupling=where.robot.coupling is not None, memory=study.correlation_time is not None, slip=slip)
+    variances = np.asarray(_variances(base, where, commands(base, where, kind, rows, study.hold), law))
+    return np.sqrt(np.mean(np.where(variances > 0.0, variances, np.nan), axis=0))
+
+
+@functools.partial(jax.jit, static_argnames="law")
+def _variances(base: Array, where: Cell, command: Wheels, law: Law) -> Array:
+    """Variances (trials, 12) by the information in each trial."""
+
+    def one(cell: Cell, command: Wheels) -> Any:
+        robot = draw_robot(seed_keys(base, cell)[0], cell)
+        slips = (0.0, 0.0) if cell.robot.slip is None else cell.robot.slip
+        noise = Noise(cell.position, cell.heading, cell.correlation_time, *slips)
+        vector = to_vector(Robot(require_physical(robot), robot.dead_zone, noise), law)
+        blank = jnp.zeros((1, *jnp.shape(command.right)))
+        runs = Runs(cell.period, Wheels(*(u[None] for u in command)), Pose(blank, blank, blank), blank == 0.0)
+        covariance = bound_covariance(vector, jnp.asarray(AT_REST, float), runs, law)
+        return jnp.diagonal(difference_covariance(vector, covariance, cell.period, law))
+
+    return jax.vmap(one)(where, command)
