@@ -34,17 +34,25 @@ def begin_from_run(run: Runs, d_max: Array, law: Law) -> tuple[Belief, Noise, Ar
     widest = widest_variance(vector, d_max)
     covariance = narrowed(fit.covariance[:PARAMETERS, :PARAMETERS], vector, widest)
 
-    def at_the_end(vector):
-        drive = Physical(jnp.exp(vector[:2]), vector[2:6].reshape(2, 2))
+    belief = at_the_end(vector, covariance, run, Motion(*fit.starts[0]), noise, None)
+    return belief, noise, widest, fit.ok
+
+
+def at_the_end(vector: Array, covariance: Array, run: Runs, start: Motion, noise: Noise, coupling) -> Belief:
+    """State and parameters after the last pose of a run (rows,): parameters (PARAMETERS,) and their covariance from
+    elsewhere, the state from the poses; `start` is where its filter is linearised before the first pose."""
+
+    def state(vector):
+        drive = Physical(jnp.exp(vector[:2]), vector[2:6].reshape(2, 2), coupling)
         pull = force(drive, effective_command(Wheels(*run.command), vector[6:8]))
         solution = hold(drive, run.step if jnp.ndim(run.step) == 0 else run.step[:-1])
-        belief, _ = scan_filter(solution, pull, unsure(Motion(*fit.starts[0]), noise), noise, run)
+        belief, _ = scan_filter(solution, pull, unsure(start, noise), noise, run)
         return belief.mean, (belief.mean, belief.covariance)
 
-    slope, (mean, own) = jax.jacfwd(at_the_end, has_aux=True)(vector)
+    slope, (mean, own) = jax.jacfwd(state, has_aux=True)(vector)
     across = slope @ covariance
     whole = jnp.block([[own + across @ slope.T, across], [across.T, covariance]])
-    return Belief(jnp.concatenate([mean, vector]), whole), noise, widest, fit.ok
+    return Belief(jnp.concatenate([mean, vector]), whole)
 
 
 def begin_from_model(model: Model, d_max: Array) -> tuple[Belief, Noise, Array]:
@@ -56,12 +64,17 @@ def begin_from_model(model: Model, d_max: Array) -> tuple[Belief, Noise, Array]:
         raise InputError("noise: a recursion needs the camera's position and heading deviations, above 0")
     vector = to_vector(Robot(drive, model.dead_zone, noise), Law())[:PARAMETERS]
     widest = widest_variance(vector, d_max)
-    rows = np.array([model.parameter_order.index(name) for name in NAMES[:PARAMETERS]])
-    covariance = narrowed(jnp.asarray(model.covariance)[np.ix_(rows, rows)], vector, widest)
+    covariance = narrowed(parameter_covariance(model), vector, widest)
     state = unsure(Motion(0.0, 0.0, 0.0, 0.0, 0.0), noise)
     between = jnp.zeros((len(state.mean), PARAMETERS))
     whole = jnp.block([[state.covariance, between], [between.T, covariance]])
     return Belief(jnp.concatenate([state.mean, vector]), whole), noise, widest
+
+
+def parameter_covariance(model: Model) -> Array:
+    """Covariance (PARAMETERS, PARAMETERS) of the rates, gains and dead zones of a physical model, natural units."""
+    rows = np.array([model.parameter_order.index(name) for name in NAMES[:PARAMETERS]])
+    return jnp.asarray(model.covariance)[np.ix_(rows, rows)]
 
 
 def unsure(state: Motion, noise: Noise) -> Belief:

@@ -23,16 +23,19 @@ class Drift(NamedTuple):
     widest: Any
 
 
-def advance_belief(belief: Belief, command: Array, step: Array, noise: Noise, coupling: Any, drift: Drift) -> Belief:
+def advance_belief(
+    belief: Belief, command: Array, step: Array, noise: Noise, coupling: Any, drift: Drift | None
+) -> Belief:
     """The belief one step [s] later under a held command (2,); `coupling` (2,) is known, or None.
 
-    The parameters stay and become less certain: their covariance grows by exp(step / memory), up to the widest.
+    The parameters stay and become less certain: their covariance grows by exp(step / memory), up to the widest. With
+    drift None it does not grow, and dead zones are taken at their mean width: the mean is then that of a free run.
     """
     mean, covariance = belief
     unknowns = mean[-PARAMETERS:]
     gain = unknowns[2:6].reshape(2, 2)
     width_deviation = jnp.sqrt(jnp.maximum(jnp.diagonal(covariance)[-2:], 0.0))
-    passed, by_width = expected_output(command, unknowns[6:], width_deviation)
+    passed, by_width = expected_output(command, unknowns[6:], 0.0 if drift is None else width_deviation)
     pull = jnp.sum(gain * passed, axis=1)
 
     def moved(log_rate):
@@ -55,7 +58,7 @@ def advance_belief(belief: Belief, command: Array, step: Array, noise: Noise, co
         mean, fresh = mean.at[5:8].multiply(left), fresh.at[5:8].set((1.0 - left**2) * camera)
     covariance = transition @ covariance @ transition.T + jnp.diag(fresh)
     covariance = covariance.at[:5, :5].add(entry @ entry.T)
-    return Belief(mean, _forget(covariance, step, drift))
+    return Belief(mean, covariance if drift is None else _forget(covariance, step, drift))
 
 
 def expected_output(command: Array, width: Array, deviation: Array) -> tuple[Array, Array]:
