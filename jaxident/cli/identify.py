@@ -31,6 +31,7 @@ NOTES = {
     "--setup-time", type=click.FloatRange(0, min_open=True), metavar="S", help="Seconds for the start values (paper)."
 )
 @click.option("--forgetting", type=float, metavar="F", help="In (0, 1]; 1, the default, forgets nothing.")
+@click.option("--coupling", is_flag=True, help="Let the two speeds drive each other: two more parameters.")
 @click.option("--d-max", type=float, metavar="D", help="Largest dead zone (default: 0.9 of the largest command).")
 @click.option(
     "--reading",
@@ -39,7 +40,7 @@ NOTES = {
 )
 @click.option("--out", metavar="MODEL", help="The model file to write.")
 @json_option
-def command(logs, method, noise_law, setup_time, forgetting, d_max, reading, out, json_file):
+def command(logs, method, noise_law, setup_time, forgetting, coupling, d_max, reading, out, json_file):
     """The model behind one or several logs (files, folders, or `-`), runs in the order given.
 
     Example: jaxident identify log.csv --out model.json
@@ -54,6 +55,7 @@ def command(logs, method, noise_law, setup_time, forgetting, d_max, reading, out
 
     records = read_logs(logs)
     settings = {"noise_law": noise_law, "setup_time": setup_time, "forgetting": forgetting, "d_max": d_max}
+    settings["coupling"] = coupling
     with working("identifying"):
         found = identify(records, method, reading=reading and reading.replace("-", "_"), **settings)
     origin = Provenance(jaxident.__version__, method, tuple(logs))

@@ -86,6 +86,8 @@ def identify(
     d_max = D_MAX_SHARE * largest if d_max is None else d_max
     check_settings(1.0 if forgetting is None else forgetting, d_max, largest)
     if method == "paper":
+        if coupling:
+            raise InputError("coupling: a term of maximum likelihood; the method 'paper' has none such")
         settings = setup_time, 1.0 if forgetting is None else forgetting, reading or "one_step"
         return _identify_as_paper(log, d_max, *settings)
     given = {"setup time": setup_time, "forgetting": forgetting, "reading": reading}
