@@ -45,7 +45,8 @@ def _lead(found: Identification, verdicts: Sequence[Verdict], percent: np.ndarra
     sure = sum(row.verdict == "determined" for row in verdicts)
     worst = CHANNELS[int(np.argmin(percent))]
     ending = "" if bool(found.ok) else " The fit did not converge: do not trust these numbers."
-    doubts = f" {len(found.suspicions)} suspicions, below." if found.suspicions else " Nothing speaks against it."
+    count = len(found.suspicions)
+    doubts = f" Suspicions: {count}, below." if count else " Nothing speaks against it."
     return (
         f"{sure} of {len(verdicts)} numbers are determined; the model explains {percent.min():.4g} % of {worst} and "
         f"more of the others.{doubts}{ending}"
