@@ -46,6 +46,7 @@ _HOMES = {
 }
 _ROOMS = {
     "recursive": "jaxident.estimation.recursive",
+    "joint_filter": "jaxident.estimation.joint_filter",
     "effects": "jaxident.effects",
     "study": "jaxident.study",
     "plot": "jaxident.plot",

@@ -31,6 +31,7 @@ NOTES = {
     "--setup-time", type=click.FloatRange(0, min_open=True), metavar="S", help="Seconds for the start values (paper)."
 )
 @click.option("--forgetting", type=float, metavar="F", help="In (0, 1]; 1, the default, forgets nothing.")
+@click.option("--coupling", is_flag=True, help="Let the two speeds drive each other: two more parameters.")
 @click.option("--d-max", type=float, metavar="D", help="Largest dead zone (default: 0.9 of the largest command).")
 @click.option(
     "--reading",
@@ -38,8 +39,9 @@ NOTES = {
     help="How the cost of the start values reads the paper's (21); one-step by default (paper).",
 )
 @click.option("--out", metavar="MODEL", help="The model file to write.")
+@click.option("--report", metavar="FILE", help="A page (.html): intervals, verdicts, doubts, residuals, pictures.")
 @json_option
-def command(logs, method, noise_law, setup_time, forgetting, d_max, reading, out, json_file):
+def command(logs, method, noise_law, setup_time, forgetting, coupling, d_max, reading, out, report, json_file):
     """The model behind one or several logs (files, folders, or `-`), runs in the order given.
 
     Example: jaxident identify log.csv --out model.json
@@ -52,13 +54,33 @@ def command(logs, method, noise_law, setup_time, forgetting, d_max, reading, out
     from jaxident.files.models import model_to_dict, save_model
     from jaxident.robot.model import Provenance
 
+    if report and method == "paper":
+        raise click.UsageError("--report needs the method maximum-likelihood")
     records = read_logs(logs)
     settings = {"noise_law": noise_law, "setup_time": setup_time, "forgetting": forgetting, "d_max": d_max}
+    settings["coupling"] = coupling
     with working("identifying"):
         found = identify(records, method, reading=reading and reading.replace("-", "_"), **settings)
     origin = Provenance(jaxident.__version__, method, tuple(logs))
     model = dataclasses.replace(found.model, provenance=origin)
     rows = verdicts(model, max(float(abs(u).max()) for record in records for u in record.command))
+    _say(found, rows, method)
+    if out:
+        save_model(model, out)
+        wrote(out)
+    if report:
+        from jaxident.report.identification import write_identification
+
+        for path in write_identification(found._replace(model=model), records, rows, report):
+            wrote(path)
+    write_json(
+        {"model": model_to_dict(model), "parameters": [row._asdict() for row in rows], "suspicions": found.suspicions},
+        json_file,
+    )
+
+
+def _say(found, rows, method: str) -> None:
+    """Print the parameters, what their intervals mean, and every warning."""
     click.echo(table([("parameter", "estimate", "95 % interval", "this input"), *(row.cells() for row in rows)]))
     click.echo(NOTES[method])
     for line in found.suspicions:
@@ -68,10 +90,3 @@ def command(logs, method, noise_law, setup_time, forgetting, d_max, reading, out
             "warning: the fit did not converge: do not trust these numbers before you have looked at the log",
             err=True,
         )
-    if out:
-        save_model(model, out)
-        wrote(out)
-    write_json(
-        {"model": model_to_dict(model), "parameters": [row._asdict() for row in rows], "suspicions": found.suspicions},
-        json_file,
-    )

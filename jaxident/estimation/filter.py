@@ -42,20 +42,20 @@ def first_belief(start: State, noise: Noise) -> Belief:
 
 
 def scan_filter(solution: Hold, pull: Force, belief: Belief, noise: Noise, run):
-    """The filter over all rows: the belief after the last one, and innovations of every row (rows, 3)."""
+    """The filter over all rows: the belief after the last pose, and innovations of every row (rows, 3)."""
     weights = step_weights(solution)
     even = jnp.ndim(solution.step) == 0
     poses = jnp.stack(run.pose, axis=-1)
-    last = jnp.arange(len(pull.along)) == len(pull.along) - 1
-    pulls = jnp.where(last[:, None], 0.0, jnp.stack(pull, axis=-1))  # a last command may be missing
+    pulls = jnp.stack(pull, axis=-1)[:-1]  # a last command acts on nothing any more, and may be missing
 
     def body(belief, now):
         pull, own, pose, seen = now
         belief, found = take_in(belief, pose, seen, noise)
         return predict_belief(belief, pull, weights if even else own, noise), found
 
-    steps = None if even else jax.tree.map(lambda leaf: jnp.concatenate([leaf, leaf[-1:]]), weights)
-    return jax.lax.scan(body, belief, (pulls, steps, poses, run.seen))
+    belief, found = jax.lax.scan(body, belief, (pulls, None if even else weights, poses[:-1], run.seen[:-1]))
+    belief, last = take_in(belief, poses[-1], run.seen[-1], noise)
+    return belief, jax.tree.map(lambda rows, row: jnp.concatenate([rows, row[None]]), found, last)
 
 
 class StepWeights(NamedTuple):
@@ -79,8 +79,13 @@ def step_weights(solution: Hold) -> StepWeights:
     return StepWeights(solution.step, rows(solution.node_v), rows(solution.node_turn), end)
 
 
-def take_in(belief: Belief, pose: Array, seen: Array, noise: Noise) -> tuple[Belief, tuple[Array, Array]]:
-    """The belief after a pose (3,), and its normalised innovations and log variances (3,); 0 where unseen."""
+def take_in(
+    belief: Belief, pose: Array, seen: Array, noise: Noise, limit: float | None = None
+) -> tuple[Belief, tuple[Array, Array]]:
+    """The belief after a pose (3,), and its normalised innovations and log variances (3,); 0 where unseen.
+
+    limit: standard deviations beyond which an innovation counts no more than one of that size (Huber 1964).
+    """
     mean, covariance = belief
     memory = noise.correlation_time is not None
     results = []
@@ -90,9 +95,10 @@ def take_in(belief: Belief, pose: Array, seen: Array, noise: Noise) -> tuple[Bel
         error = pose[k] - (mean[k] + mean[5 + k] if memory else mean[k])
         error = wrap(error) if k == 2 else error
         weight = jnp.where(seen, shared / variance, 0.0)
-        mean = mean + weight * error
+        size = jnp.sqrt(variance)
+        mean = mean + weight * (error if limit is None else jnp.clip(error, -limit * size, limit * size))
         covariance = covariance - weight[:, None] * shared
-        results.append((error / jnp.sqrt(variance), jnp.log(variance)))
+        results.append((error / size, jnp.log(variance)))
     normalised, log_variance = (jnp.where(seen, jnp.stack(part), 0.0) for part in zip(*results, strict=True))
     return Belief(mean, covariance), (normalised, log_variance)
 
@@ -133,5 +139,5 @@ def advance_with_slopes(state: Array, pull: Array, weights: StepWeights) -> tupl
 
 
 def _multiply(left: Array, right: Array) -> Array:
-    """left @ right in plain arithmetic, which maps over trials."""
+    """left @ right of two matrices in plain arithmetic, which maps over trials."""
     return jnp.sum(left[:, :, None] * right[None, :, :], axis=1)

@@ -78,8 +78,7 @@ def identify(
     precision; InputError says what a log lacks, WorkError that the result is not finite.
     """
     require_float64("identify")
-    if method not in METHODS:
-        raise InputError(f"method {method!r}: choose from {', '.join(METHODS)}")
+    _check_method(method, coupling)
     log = join(logs)
     check_informative(log)
     largest = float(np.nanmax(np.abs(np.stack(log.command))))
@@ -95,6 +94,13 @@ def identify(
     return Identification(
         found.model, found.model.covariance, found.residuals, found.fit.ok, fit=found.fit, suspicions=found.suspicions
     )
+
+
+def _check_method(method: str, coupling: bool) -> None:
+    if method not in METHODS:
+        raise InputError(f"method {method!r}: choose from {', '.join(METHODS)}")
+    if method == "paper" and coupling:
+        raise InputError("coupling: a term of maximum likelihood; the method 'paper' has none such")
 
 
 def _identify_as_paper(

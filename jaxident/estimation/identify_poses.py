@@ -13,6 +13,7 @@ from jaxident.estimation.noise_law import WHITE, fit_law, whiteness
 from jaxident.estimation.parameters import Law, names, to_vector
 from jaxident.estimation.precision import difference_covariance, spread_of
 from jaxident.estimation.runs import Runs, stack_runs
+from jaxident.estimation.suspicions import log_suspicions
 from jaxident.log import Log
 from jaxident.robot.drive import Physical
 from jaxident.robot.model import Model, Provenance
@@ -22,7 +23,7 @@ SMALLEST_LOG = 20
 
 class PoseFit(NamedTuple):
     """A model, the residuals [m], [m], [rad] (rows,) of the log, NaN where no pose was, the fit and its law, and what
-    speaks against that law, a line each."""
+    speaks against that law or the log itself, a line each."""
 
     model: Model
     residuals: Pose
@@ -45,9 +46,9 @@ def identify_poses(log: Log, d_max: float, noise_law: str, coupling: bool) -> Po
     fit, law = fit_law(jax.tree.map(jnp.asarray, runs), jnp.asarray(d_max), noise_law, coupling)
     if not all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves((fit.robot, fit.covariance))):
         raise WorkError("the maximum-likelihood estimate is not finite: the log does not determine the model")
-    return PoseFit(
-        _model(fit, law, float(np.median(_steps(log)))), _residuals(fit, runs, log), fit, law, _suspicions(fit, runs)
-    )
+    deviation = np.sqrt(np.diagonal(np.asarray(fit.covariance))[2:6]).reshape(2, 2)
+    suspicions = (*_suspicions(fit, runs), *log_suspicions(log, fit.robot, deviation))
+    return PoseFit(_model(fit, law, float(np.median(_steps(log)))), _residuals(fit, runs, log), fit, law, suspicions)
 
 
 def _with_commands(log: Log) -> Log:

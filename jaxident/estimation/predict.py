@@ -1,6 +1,7 @@
 """Free-run prediction from many rows of a log, each start state estimated from the rows before it alone."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -9,6 +10,7 @@ import numpy as np
 
 from jaxident.array_types import Array, Pose, State, Wheels
 from jaxident.errors import InputError
+from jaxident.estimation.predict_filtered import filter_rows, run_ahead_filtered
 from jaxident.log import Log
 from jaxident.numerics import require_float64, wrap
 from jaxident.robot.dead_zone import effective_command
@@ -28,7 +30,7 @@ SPEED_PRIOR = 10.0
 
 class Prediction(NamedTuple):
     """One entry per predicted row (rows,): the run, the row of it that the prediction starts from, the steps since,
-    the time [s], the pose [m], [rad] and its standard deviation from the start state's uncertainty."""
+    the time [s], the pose [m], [rad] and its standard deviation (`predict` says from what)."""
 
     run: Any
     start: Any
@@ -54,10 +56,12 @@ class Window(NamedTuple):
 def predict(model: Model, log: Log, horizon: int, *, burn_in: int = 20, stride: int | None = None) -> Prediction:
     """Free runs over `horizon` rows from rows burn_in, burn_in + stride, ... of each run (stride: the horizon).
 
-    The start state (pose and speeds at the first of the last `burn_in` rows) is fitted to the poses up to the start
-    by Gauss-Newton, each channel weighted by its noise: the model's, or the fit's own. Runs too short to start in
-    are left out; a free run ends with its run. InputError where no run is long enough, or for a model with effects,
-    which this prediction does not know. Needs double precision.
+    A physical model with a noise law starts from the filtered state (`predict_filtered`: over the last `burn_in` rows,
+    with slip over at least FORGOTTEN), and the deviations tell of start state, slip and the covariance of the
+    parameters. For other models the state at the first of the last `burn_in` rows is fitted to the poses up to the
+    start by Gauss-Newton, each channel weighted by the fit's own noise; the deviations tell of that fit alone. Runs
+    too short to start in are left out; a free run ends with its run. InputError where no run is long enough, or for a
+    model with effects, which this prediction does not know. Needs double precision.
     """
     require_float64("predict")
     if model.effects:
@@ -68,25 +72,34 @@ def predict(model: Model, log: Log, horizon: int, *, burn_in: int = 20, stride: 
             raise InputError(f"{name} {value}: at least {least} row is needed")
     if isinstance(model.dynamics, Difference):
         check_period(model, log)
-    numbers, starts, windows = _cut(log, horizon, burn_in, stride)
-    early = jax.tree.map(lambda column: column[:, : burn_in + 1], windows)
-    run = _run_ahead(model, windows, _fit_with_noise(model, early))
-    pose, deviation = jax.tree.map(lambda column: np.asarray(column)[:, burn_in + 1 :], run)
-    return _flatten(log, numbers, starts, windows, pose, deviation, burn_in)
+    filtered = filter_rows(model, burn_in)
+    before = burn_in if filtered is None else filtered
+    numbers, starts, windows = _cut(log, horizon, burn_in, stride, before)
+    if filtered is None:
+        early = jax.tree.map(lambda column: column[:, : before + 1], windows)
+        run = _run_ahead(model, windows, _fit_with_noise(model, early))
+        run = jax.tree.map(lambda column: column[:, before + 1 :], run)
+    else:
+        run = _filter_all(model, windows, before)
+    pose, deviation = jax.tree.map(np.asarray, run)
+    return _flatten(log, numbers, starts, windows, pose, deviation, before)
 
 
-def _cut(log: Log, horizon: int, burn_in: int, stride: int) -> tuple[np.ndarray, np.ndarray, Window]:
-    """Run index, start row and window of every start; rows past the end of a run repeat with time going on."""
+def _cut(log: Log, horizon: int, burn_in: int, stride: int, before: int) -> tuple[np.ndarray, np.ndarray, Window]:
+    """Run index, start row and window of every start, `before` rows before it.
+
+    Rows past the end of a run repeat with time going on; those before its beginning hold no pose and no command.
+    """
     numbers, starts, windows = [], [], []
     for number, run in enumerate(log.runs()):
         period = float(np.median(np.diff(run.t))) if len(run.t) > 1 else 1.0
         for start in range(burn_in, len(run.t) - 1, stride):
-            rows = np.arange(start - burn_in, start + horizon + 1)
-            inside = np.minimum(rows, len(run.t) - 1)
+            rows = np.arange(start - before, start + horizon + 1)
+            inside = np.clip(rows, 0, len(run.t) - 1)
             t = np.asarray(run.t)[inside] + period * (rows - inside)
             pose = Pose(*(np.asarray(column)[inside] for column in run.pose))
-            known = np.isfinite(pose.x) & (rows <= start)
-            command = Wheels(*(np.asarray(u)[inside] for u in run.command))
+            known = np.isfinite(pose.x) & (rows <= start) & (rows >= 0)
+            command = Wheels(*(np.where(rows < 0, 0.0, np.asarray(u)[inside]) for u in run.command))
             windows.append(Window(t, command, Pose(*(np.where(known, c, 0.0) for c in pose)), known))
             numbers.append(number)
             starts.append(start)
@@ -165,6 +178,11 @@ def _fit_all(model: Model, windows: Window, noise: Array) -> Fit:
     return _over_windows(lambda window: _fit_start(model, window, noise), windows)
 
 
+@partial(jax.jit, static_argnames="before")
+def _filter_all(model: Model, windows: Window, before: int) -> tuple[Pose, Pose]:
+    return _over_windows(lambda window: run_ahead_filtered(model, window, before), windows)
+
+
 def _fit_with_noise(model: Model, windows: Window) -> Fit:
     """Fits weighted by the camera's noise: the model's, else that of the residual of equally weighted fits."""
     law = model.noise
@@ -191,14 +209,14 @@ def _run_ahead(model: Model, windows: Window, fits: Fit) -> tuple[Pose, Pose]:
     return _over_windows(lambda pair: one(*pair), (windows, fits))
 
 
-def _flatten(log, numbers, starts, windows, pose, deviation, burn_in) -> Prediction:
+def _flatten(log, numbers, starts, windows, pose, deviation, before) -> Prediction:
     """One row per predicted row that the log still has."""
     lengths = np.array([len(run.t) for run in log.runs()])
     names = np.array([run.run[0] for run in log.runs()])
     horizon = pose.x.shape[1]
     step = np.broadcast_to(np.arange(1, horizon + 1), pose.x.shape)
     kept = starts[:, None] + step < lengths[numbers][:, None]
-    times = np.asarray(windows.t)[:, burn_in + 1 :][kept]
+    times = np.asarray(windows.t)[:, before + 1 :][kept]
     values = (column[kept] for column in (*pose, *deviation))
     run, start = (np.broadcast_to(column[:, None], pose.x.shape)[kept] for column in (names[numbers], starts))
     return Prediction(run, start, step[kept], times, *values)

@@ -26,6 +26,7 @@ KINK_STEP, KINK_TOLERANCE = 1e-2, 1e-4
 """At a kink: steps of dead zones below this many standard deviations fail, and the rest promises less than this."""
 DEAD_ZONES = slice(6, 8)
 STUCK, LOOSENED = 1e4, 1e-8
+"""Damping from which a search counts as stuck at a kink of a dead zone, and the factor that loosens all others then."""
 LONGEST_LOG_STEP, LONGEST_SHARE = 1.5, 0.25
 """A step changes a logarithm by at most this much, and a dead zone by this share of its bound."""
 

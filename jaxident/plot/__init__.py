@@ -16,6 +16,8 @@ _HOMES = {
     "convergence": "estimates",
     "tracking": "estimates",
     "error_against_noise": "estimates",
+    "residuals": "fits",
+    "correlation": "fits",
     "effect_signature": "effects",
     "estimate_errors": "studies",
     "heat_map": "studies",

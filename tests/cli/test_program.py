@@ -88,6 +88,8 @@ def test_wrong_use(folder):
     refused(jaxident("identify", folder / "none.csv"), "none.csv")
     refused(jaxident("identify", log, "--method", "paper", "--forgetting", 1.5), "forgetting 1.5")
     refused(jaxident("identify", log, "--d-max", 7), "d-max 7")
+    refused(jaxident("identify", log, "--method", "paper", "--coupling"), "coupling")
+    refused(jaxident("identify", log, "--method", "paper", "--report", "x.html"), "--report needs")
     refused(jaxident("simulate", "published", "--out", "x.csv", cwd=folder), "--inputs LOG or --excitation NAME")
     refused(jaxident("predict", folder / "model.json", log, "--horizon", 5000, "--burn-in", 900, "--out", "x.csv",
                      cwd=folder), "burn-in of 900 rows")  # fmt: skip

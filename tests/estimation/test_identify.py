@@ -78,6 +78,7 @@ def test_covariance_is_symmetric_and_tells_every_deviation():
         ({"d_max": 0.0}, "d-max 0"),
         ({"setup_time": 0.1}, "setup time 0.1 s"),
         ({"reading": "both"}, "reading 'both'"),
+        ({"coupling": True}, "coupling"),
     ],
 )
 def test_wrong_settings_are_named(log, settings, words):

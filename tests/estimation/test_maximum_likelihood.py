@@ -142,6 +142,22 @@ def test_coloured_residuals_are_suspected():
     assert sum(bool(identify(logged(seed, Noise(1e-3, 1e-2))).suspicions) for seed in range(10)) <= 1
 
 
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        (lambda log: log._replace(y=-log.y), "mirrored"),
+        (lambda log: log._replace(theta=np.degrees(log.theta)), "degrees"),
+        (lambda log: log._replace(x=1e3 * log.x, y=1e3 * log.y), "millimetres"),
+        (lambda log: log._replace(u_r=log.u_l, u_l=log.u_r), "swapped"),
+        (lambda log: log._replace(u_r=-log.u_r), "right wheel"),
+        (lambda log: log._replace(u_r=np.roll(log.u_r, -4), u_l=np.roll(log.u_l, -4)), "only 4 rows"),
+    ],
+)
+def test_what_users_trip_over_is_suspected_after_any_fit(changed, words):
+    suspicions = identify(changed(logged(4, Noise(5e-4, 5e-3)))).suspicions
+    assert any(words in line for line in suspicions), suspicions
+
+
 @pytest.mark.slow
 def test_auto_finds_the_noise_law():
     memory = identify(logged(4, Noise(1e-3, 1e-2, 0.3), 400), noise_law="auto")

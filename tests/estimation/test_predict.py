@@ -8,6 +8,7 @@ import pytest
 from support.records import without_poses
 
 from jaxident.errors import InputError
+from jaxident.estimation.parameters import NAMES
 from jaxident.estimation.predict import predict, prediction_error
 from jaxident.files.models import load_model
 from jaxident.log import Log, join
@@ -18,6 +19,7 @@ from jaxident.study.synthetic import excite
 
 ROBOT = load_model("published")
 ROWS = 200
+CAMERA = np.array([1e-3, 1e-3, 1e-2])
 
 
 def made(seed=0, rows=ROWS, noise=None):
@@ -77,6 +79,29 @@ def test_deviations_are_the_spread_over_seeds():
         ends = np.array([getattr(run, value)[-1] for run in runs])
         told = np.median([getattr(run, deviation)[-1] for run in runs])
         assert np.std(ends, ddof=1) == pytest.approx(told, rel=0.26)
+
+
+@pytest.mark.parametrize(
+    "noise", [pytest.param(Noise(1e-3, 1e-2, 0.1), marks=pytest.mark.slow), Noise(1e-3, 1e-2, None, 0.01, 0.2)]
+)
+def test_bands_cover_under_slip_and_uncertain_parameters(noise):
+    """200 runs, each predicted by a model of its own whose parameters are 1 % off: 95 % bands of three channels cover
+    the true pose within four standard errors, 4 * sqrt(0.05 * 0.95 / 200) of each channel."""
+    rng, hits = np.random.default_rng(0), []
+    truth = np.concatenate([np.ravel(part) for part in (ROBOT.physical.rate, ROBOT.physical.gain, ROBOT.dead_zone)])
+    for seed in range(200):
+        values = truth * (1.0 + 0.01 * rng.normal(size=8))
+        drive = ROBOT.physical._replace(rate=values[:2], gain=values[2:6].reshape(2, 2))
+        model = dataclasses.replace(
+            ROBOT, dynamics=drive, dead_zone=values[6:], noise=noise,
+            covariance=np.diag((0.01 * truth) ** 2), parameter_order=NAMES[:8],
+        )  # fmt: skip
+        log = made(seed, 61, noise)
+        found = predict(model, log, 30, burn_in=30, stride=60)
+        deviations = np.sqrt(np.array([found.sd_x, found.sd_y, found.sd_theta])[:, -1] ** 2 + CAMERA**2)
+        missed = np.array([found.x, found.y, found.theta])[:, -1] - np.array([log.x, log.y, log.theta])[:, -1]
+        hits.append(np.abs(missed) < 1.96 * deviations)
+    np.testing.assert_allclose(np.mean(hits, axis=0), 0.95, atol=0.062)
 
 
 def test_what_cannot_be_predicted_says_why(log):

@@ -1,0 +1,212 @@
+"""What a log says against itself: frames, units, wheels, delays and odometry that users trip over, a line each.
+
+NumPy alone, on motions from one seen pose to the next: along and to the left in the frame of the heading halfway, and
+the turn. Thresholds are wide: a suspicion says what to check, it changes nothing.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jaxident.errors import InputError
+from jaxident.estimation.parameters import Robot
+from jaxident.log import Log, even_period
+
+FEWEST = 30
+"""Motions that a judgement needs."""
+LARGEST_TRACK = 5.0
+"""Distance between the wheels [m] beyond which positions are hardly in metres."""
+SURE = 5.0
+"""Standard deviations from zero at which the sign of a gain counts."""
+TAPS, ANSWERED, CLEAR = 12, 0.4, 6.0
+"""Rows over which the answer to a command is looked at; the share of its peak that counts as an answer; how many
+standard deviations the peak has to stand out."""
+SEVERAL = 2
+"""Rows of delay that are worth a word."""
+ODOMETRY, NOISY, EXACT = 0.05, 1e-3, 1e-9
+"""Sideways over along: of the noise where that is at least NOISY of the motion, else of the motion itself."""
+SIDEWAYS, STRAIGHT = 0.3, 0.1
+"""Share of sideways motion that puzzles, and the one that a better reading of the heading must reach."""
+
+
+class Motions(NamedTuple):
+    """Between rows `lag` apart with poses (motions,): run and row they start from, displacement [m], heading halfway
+    and turn [rad]."""
+
+    run: Any
+    row: Any
+    dx: Any
+    dy: Any
+    middle: Any
+    turn: Any
+
+    def along(self) -> np.ndarray:
+        """Path length of the arc whose chord was seen [m]."""
+        chord = self.dx * np.cos(self.middle) + self.dy * np.sin(self.middle)
+        return chord / np.sinc(self.turn / (2.0 * np.pi))
+
+    def left(self) -> np.ndarray:
+        """Sideways motion [m]."""
+        return self.dy * np.cos(self.middle) - self.dx * np.sin(self.middle)
+
+
+def motions(log: Log, lag: int = 1, read: Callable[[np.ndarray], np.ndarray] = np.asarray) -> Motions:
+    """Motions over `lag` rows; `read` turns the heading column into headings."""
+    parts = []
+    for number, run in enumerate(log.runs()):
+        x, y, theta = np.asarray(run.x), np.asarray(run.y), read(np.asarray(run.theta))
+        rows = np.flatnonzero(np.isfinite(x[lag:] + x[:-lag] + theta[lag:] + theta[:-lag]))
+        turn = (theta[rows + lag] - theta[rows] + np.pi) % (2.0 * np.pi) - np.pi
+        parts.append(
+            (np.full(len(rows), number), rows, x[rows + lag] - x[rows], y[rows + lag] - y[rows],
+             theta[rows] + 0.5 * turn, turn)
+        )  # fmt: skip
+    return Motions(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+
+
+def log_suspicions(log: Log, robot: Robot, gain_deviation: np.ndarray) -> tuple[str, ...]:
+    """All suspicions about a log (NumPy arrays), given the robot fitted to it and its gains' deviations (2, 2)."""
+    single = motions(log)
+    if len(single.row) < FEWEST:
+        return ()
+    gain = np.array([[float(g) for g in row] for row in robot.drive.gain])
+    rate = np.array([float(r) for r in robot.drive.rate])
+    frame = flipped_heading(log, single) or misread_heading(log)
+    lines = [frame] if frame else [wheel_signs(gain, gain_deviation), position_unit(rate, gain, gain_deviation)]
+    answers = [] if frame else _answers(log, single, rate, gain, np.array([float(d) for d in robot.dead_zone]))
+    if answers:
+        lines += [delayed(answers, even_period(log)), odometry(single, answers[0])]
+    return tuple(line for line in lines if line)
+
+
+def flipped_heading(log: Log, single: Motions) -> str:
+    """Half turns from one row to the next, by a robot that does not turn fast."""
+    size = np.abs(single.turn)
+    half, odd = size > np.pi - 0.5, (size > 1.2) & (size <= np.pi - 0.5)
+    if not half.any() or np.median(size) > 0.5 or 4 * odd.sum() > half.sum():
+        return ""
+    first = np.argmax(half)
+    t = log.runs()[single.run[first]].t[single.row[first] + 1]
+    return f"the heading jumps by half a turn {half.sum()} times, first at t = {t:g} s: a marker read upside down?"
+
+
+def misread_heading(log: Log) -> str:
+    """Motion that would point along the heading if the column were read in another way."""
+    noise = _position_noise(log)
+    readings: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+        "": np.asarray,
+        "degrees: convert it to radians": np.radians,
+        "mirrored, as in a picture whose y axis points down: negate y": np.negative,
+        "as if x and y were swapped": lambda theta: 0.5 * np.pi - theta,
+        "a quarter turn off: the marker sits sideways": lambda theta: theta + 0.5 * np.pi,
+    }
+    shares = {text: _sideways(log, noise, read) for text, read in readings.items()}
+    best = min(shares, key=lambda text: shares[text])
+    if not (shares[""] > SIDEWAYS and shares[best] < STRAIGHT):
+        return ""
+    numbers = f"{100 * shares['']:.0f} % of the motion is sideways, {100 * shares[best]:.0f} % if it were"
+    return f"the heading does not point where the robot goes ({numbers}): it looks {best}"
+
+
+def _position_noise(log: Log) -> float:
+    """Camera noise in position [m] from third differences, which motion hardly reaches."""
+    thirds = [np.diff(np.asarray(column), 3) for run in log.runs() for column in (run.x, run.y)]
+    size = np.abs(np.concatenate(thirds))
+    return float(1.48 * np.median(size[np.isfinite(size)])) / np.sqrt(20.0) if np.isfinite(size).any() else np.inf
+
+
+def _sideways(log: Log, noise: float, read: Callable[[np.ndarray], np.ndarray]) -> float:
+    """Share of sideways in the squared motion, over the fewest rows that bring it clear of the noise."""
+    for lag in (1, 2, 4, 8, 16):
+        moved = motions(log, lag, read)
+        straight = np.abs(moved.turn) < 1.0
+        size = (moved.dx**2 + moved.dy**2)[straight]
+        if size.size >= FEWEST and np.sqrt(np.mean(size)) > 6.0 * noise:
+            return float(np.mean(moved.left()[straight] ** 2) / np.mean(size))
+    return np.nan
+
+
+def wheel_signs(gain: np.ndarray, deviation: np.ndarray) -> str:
+    """Wheels that push the wrong way: the signs of the gains (2, 2) should be + + along and + - in heading."""
+    if np.any(np.abs(gain) < SURE * deviation):
+        return ""
+    found: dict[tuple[int, ...], str] = {
+        (1, 1, -1, 1): "the robot turns against its wheels: right and left are swapped, or y points down",
+        (-1, -1, -1, 1): "both wheels run backwards under positive commands",
+        (-1, -1, 1, -1): "positive commands drive the robot backwards: the marker is turned by half a turn, or "
+        "both wheels are reversed and swapped",
+        (-1, 1, -1, -1): "the right wheel runs backwards under positive commands",
+        (1, -1, 1, 1): "the left wheel runs backwards under positive commands",
+    }
+    line = found.get(tuple(int(s) for s in np.sign(gain).ravel()), "")
+    return f"{line} (signs of the gains, each {SURE:g} standard deviations clear)" if line else ""
+
+
+def position_unit(rate: np.ndarray, gain: np.ndarray, deviation: np.ndarray) -> str:
+    """The distance between the wheels that speeds along and in heading imply."""
+    along, turning = np.abs(gain[0]).sum() / rate[0], np.abs(gain[1]).sum() / rate[1]
+    if np.any(np.abs(gain) < SURE * deviation) or not along > LARGEST_TRACK * turning:
+        return ""
+    return f"the wheels would stand {along / turning:.3g} m apart: positions in millimetres instead of metres?"
+
+
+class Answer(NamedTuple):
+    """How a channel answers commands: weights (TAPS,), their deviation, and the deviation of what is left [m, rad]."""
+
+    weights: Any
+    deviation: Any
+    left: Any
+
+
+def _answers(log: Log, single: Motions, rate: np.ndarray, gain: np.ndarray, width: np.ndarray) -> list[Answer]:
+    """Both channels' answers to the pull of the wheels over the last rows; none for an uneven log.
+
+    Increments y_k - exp(-rate step) y_{k-1} leave two weights, rows 0 and 1, of a robot without delay: (13)-(14).
+    """
+    try:
+        period = even_period(log)
+    except InputError:
+        return []
+    passed = [np.sign(u) * np.maximum(np.abs(u) - d, 0.0) for u, d in zip(log.command, width, strict=True)]
+    first = np.cumsum([0, *(len(run.t) for run in log.runs())])
+    place = first[single.run] + single.row
+    found = []
+    for k, increment in enumerate((single.along(), single.turn)):
+        pull = np.nan_to_num(gain[k, 0] * passed[0] + gain[k, 1] * passed[1])
+        follows = np.flatnonzero((np.diff(place) == 1) & (single.row[1:] >= TAPS)) + 1
+        target = increment[follows] - np.exp(-rate[k] * period) * increment[follows - 1]
+        columns = np.stack([pull[place[follows] - lag] for lag in range(TAPS)], axis=1)
+        if len(target) < 4 * TAPS or np.linalg.matrix_rank(columns) < TAPS:
+            return []
+        weights, *_ = np.linalg.lstsq(columns, target, rcond=None)
+        left = np.std(target - columns @ weights)
+        spread = np.sqrt(np.diagonal(np.linalg.inv(columns.T @ columns)))
+        found.append(Answer(weights, left * spread, left))
+    return found
+
+
+def delayed(answers: list[Answer], period: float) -> str:
+    """Rows that pass before the clearer channel answers."""
+    clear = [np.max(np.abs(one.weights)) / max(np.max(one.deviation), 1e-300) for one in answers]
+    answer = answers[int(np.argmax(clear))]
+    late = int(np.argmax(np.abs(answer.weights) > ANSWERED * np.max(np.abs(answer.weights))))
+    if max(clear) < CLEAR or late < SEVERAL:
+        return ""
+    return (
+        f"the robot answers a command only {late} rows ({late * period:.3g} s) later: a delay, which this model has "
+        "not; `jaxident diagnose` measures it"
+    )
+
+
+def odometry(single: Motions, along: Answer) -> str:
+    """Poses that never err sideways come from wheels, not from a camera."""
+    sideways, motion = np.std(single.left()), np.sqrt(np.mean(single.along() ** 2))
+    turning = np.sqrt(np.mean(single.turn**2)) > 1e-3
+    share = sideways / along.left if along.left > NOISY * motion else sideways / motion * ODOMETRY / EXACT
+    if not (turning and share < ODOMETRY):
+        return ""
+    return (
+        f"sideways the poses err by {sideways:.1g} m per row, along by {along.left:.1g} m: they look like wheel "
+        "odometry, which hides the slip that a camera would see"
+    )

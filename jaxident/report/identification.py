@@ -1,0 +1,121 @@
+"""The page of `jaxident identify`: parameters and how sure they are, what the log says against it, what is left."""
+
+import os
+from collections.abc import Sequence
+
+import numpy as np
+
+from jaxident import plot
+from jaxident.errors import InputError
+from jaxident.estimation.identify import Identification
+from jaxident.estimation.residual_tests import CHANNELS, DRAWN_LAGS, correlations, fit_percent, residual_tests
+from jaxident.estimation.runs import stack_runs
+from jaxident.estimation.verdict import Verdict
+from jaxident.files.atomic import Target
+from jaxident.log import Log, join
+from jaxident.plot.style import legend_above
+from jaxident.report.page import Figure, Page, Section, Table, write_page
+
+
+def write_identification(
+    found: Identification, logs: Sequence[Log], verdicts: Sequence[Verdict], path: Target
+) -> list[str]:
+    """Write the page of a maximum-likelihood fit to some logs; returns its path. InputError for another method."""
+    if found.fit is None:
+        raise InputError("report: a page is written for maximum likelihood; the method 'paper' has none")
+    write_page(_page(found, join(logs), verdicts), path)
+    return [os.fspath(path)]
+
+
+def _page(found: Identification, log: Log, verdicts: Sequence[Verdict]) -> Page:
+    runs = stack_runs(log)
+    normalised = np.asarray(found.fit.innovations.normalised) if found.fit is not None else np.zeros(0)
+    percent = fit_percent(log, found.residuals)
+    sections = [
+        Section("Parameters", [Table(COLUMNS, [row.cells() for row in verdicts], ABOUT_INTERVALS), _dead_zones(found)]),
+        Section("What speaks against it", _doubts(found)),
+        Section("What it explains", [_percent_table(percent), _path(found, log)]),
+        Section("What is left", [ABOUT_TESTS, _tests(normalised, runs), *_pictures(found, log, normalised, runs.seen)]),
+    ]
+    origin = found.model.provenance
+    return Page("The robot behind the log", _lead(found, verdicts, percent), sections, f"jaxident {origin.version}")
+
+
+def _lead(found: Identification, verdicts: Sequence[Verdict], percent: np.ndarray) -> str:
+    sure = sum(row.verdict == "determined" for row in verdicts)
+    worst = CHANNELS[int(np.argmin(percent))]
+    ending = "" if bool(found.ok) else " The fit did not converge: do not trust these numbers."
+    count = len(found.suspicions)
+    doubts = f" Suspicions: {count}, below." if count else " Nothing speaks against it."
+    return (
+        f"{sure} of {len(verdicts)} numbers are determined; the model explains {percent.min():.4g} % of {worst} and "
+        f"more of the others.{doubts}{ending}"
+    )
+
+
+def _doubts(found: Identification) -> list[str]:
+    return [f"{line[0].upper()}{line[1:]}." for line in found.suspicions] or ["No suspicion was raised."]
+
+
+def _percent_table(percent: np.ndarray) -> Table:
+    return Table(("channel", "fit [%]"), list(zip(CHANNELS, map(float, percent), strict=True)), ABOUT_PERCENT)
+
+
+def _tests(normalised: np.ndarray, runs) -> Table:
+    rows = [
+        (one.channel, one.question, one.value, one.limit, "yes" if one.passed else "no")
+        for one in residual_tests(normalised, runs.seen, runs.command)
+    ]
+    return Table(("channel", "are the residuals", "number", "limit", "passed"), rows)
+
+
+def _dead_zones(found: Identification) -> Figure:
+    figure, ax = plot.figure(size=(4.5, 3.2))
+    plot.dead_zone(np.asarray(found.model.dead_zone), ax=ax, label=["right wheel", "left wheel"])
+    return Figure(plot.image(figure), "Dead zones", "What passes the dead zone of each wheel.")
+
+
+def _path(found: Identification, log: Log) -> Figure:
+    """Measured poses and the model's: measured minus residual."""
+    figure, ax = plot.figure(size=(6.3, 4.6))
+    plot.path(log, ax=ax)
+    for run in np.unique(np.asarray(log.run)):
+        own = np.asarray(log.run) == run
+        x, y = (np.asarray(c)[own] - r[own] for c, r in zip(log.pose[:2], found.residuals[:2], strict=True))
+        ax.plot(x, y, color="#0072B2", linewidth=0.8, label="model" if run == np.ravel(log.run)[0] else None)
+    legend_above(ax)
+    return Figure(plot.image(figure), "Path", "Measured poses and the model's, run by run from one start state each.")
+
+
+def _pictures(found: Identification, log: Log, normalised: np.ndarray, seen: np.ndarray) -> list[Figure]:
+    lengths = [len(run.t) for run in log.runs()]
+    rows = [np.where(s, n, np.nan)[:, :k] for n, s, k in zip(normalised, seen[:, None], lengths, strict=True)]
+    times, begin = [], 0.0
+    for run in log.runs():
+        times.append(begin + np.asarray(run.t) - run.t[0])
+        begin = float(times[-1][-1])
+    figure, axes = plot.figure(3, 1, share_x=True, size=(6.3, 4.2))
+    plot.residuals(np.concatenate(times), np.concatenate(rows, axis=1), axes=axes)
+    values = correlations(normalised, seen, range(1, 1 + min(DRAWN_LAGS, max(lengths) - 1)))
+    second, ax = plot.figure(size=(6.3, 2.8))
+    plot.correlation(values, int(np.sum(seen)), ax=ax)
+    return [
+        Figure(plot.image(figure), "Residuals against time", "Residuals over their standard deviations."),
+        Figure(plot.image(second), "Correlation of the residuals", "A right model under a right noise law stays in "
+               "the band; a wave or a slow fall is something that the model has not."),
+    ]  # fmt: skip
+
+
+COLUMNS = ("parameter", "estimate", "95 % interval", "this input")
+ABOUT_INTERVALS = (
+    "Intervals hold under the noise law whose numbers stand at the end. Determined: the half-width is below a tenth of "
+    "the parameter (for a dead zone, of the largest command); weak: below a half."
+)
+ABOUT_PERCENT = (
+    "100 (1 - residual / motion about the run's mean), both root mean square. Residuals are those of the whole run "
+    "from one start state; under a noise law with slip or a memory, those of the next pose."
+)
+ABOUT_TESTS = (
+    "Tests of the poses' own residuals. Increments of poses would not do: differencing makes neighbours of even white "
+    "camera error correlate by -1/2. Each limit is passed by about one in a hundred right fits or fewer."
+)

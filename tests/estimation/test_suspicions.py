@@ -1,0 +1,111 @@
+"""What users trip over is said, and clean logs are left in peace: the simulator under many inputs and noises."""
+
+import dataclasses
+
+import jax
+import numpy as np
+import pytest
+
+from jaxident.estimation.parameters import Robot
+from jaxident.estimation.suspicions import log_suspicions, motions
+from jaxident.files.models import load_model
+from jaxident.log import Log, join
+from jaxident.robot.drive import Physical
+from jaxident.robot.model import Effect
+from jaxident.robot.noise import Noise
+from jaxident.study.synthetic import excite, simulate_runs
+
+PUBLISHED = load_model("published")
+DRIVE = Physical(np.asarray(PUBLISHED.physical.rate), np.asarray(PUBLISHED.physical.gain))
+ROBOT = dataclasses.replace(PUBLISHED, dynamics=DRIVE)
+CAMERA = (5e-4, 5e-3)
+
+
+def made(kind="multilevel", noise=CAMERA, effect=None, seed=0):
+    robot = ROBOT if effect is None else dataclasses.replace(ROBOT, effects=(effect,))
+    inputs = excite(jax.random.key(seed), kind, 600, ROBOT.sample_period)
+    return simulate_runs(robot, inputs, noise=noise, key=jax.random.key(seed + 9))
+
+
+def said(log, gain=DRIVE.gain):
+    robot = Robot(DRIVE._replace(gain=gain), np.asarray(ROBOT.dead_zone), Noise(*CAMERA))
+    return log_suspicions(log, robot, 0.01 * np.abs(np.asarray(gain)))
+
+
+@pytest.fixture(scope="module")
+def log():
+    return made()
+
+
+@pytest.mark.parametrize("kind", ["multilevel", "staircase", "prbs", "multisine", "chirp"])
+@pytest.mark.parametrize("noise", [None, (2e-4, 2e-3), (1e-3, 1e-2), (5e-3, 5e-2)])
+def test_clean_logs_are_left_in_peace(kind, noise):
+    assert said(made(kind, noise)) == ()
+
+
+def test_clean_runs_with_gaps_are_left_in_peace(log):
+    blind = np.arange(600) % 7 == 3
+    gaps = log._replace(**{c: np.where(blind, np.nan, getattr(log, c)) for c in ("x", "y", "theta")})
+    turned = made(seed=1)._replace(theta=np.angle(np.exp(1j * made(seed=1).theta)))
+    assert said(join([gaps, turned])) == ()
+    assert said(log.rows(0, 20)) == ()
+
+
+@pytest.mark.parametrize("noise", [(2e-4, 2e-3), (1e-3, 1e-2)])
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        (lambda log: log._replace(theta=np.degrees(log.theta)), "degrees"),
+        (lambda log: log._replace(theta=np.degrees(np.angle(np.exp(1j * log.theta)))), "degrees"),
+        (lambda log: log._replace(y=-log.y), "mirrored"),
+        (lambda log: log._replace(x=log.y, y=log.x), "swapped"),
+        (lambda log: log._replace(theta=log.theta + 0.5 * np.pi), "quarter turn"),
+        (lambda log: log._replace(theta=log.theta + np.pi * (np.arange(600) // 3 % 40 == 7)), "half a turn 10 times"),
+    ],
+)
+def test_frames_and_units_of_the_heading(changed, words, noise):
+    (line,) = said(changed(made(noise=noise)))
+    assert words in line
+
+
+@pytest.mark.parametrize(
+    ("signs", "words"),
+    [
+        ([[1, 1], [-1, -1]], "swapped"),
+        ([[-1, -1], [-1, -1]], "both wheels run backwards"),
+        ([[-1, -1], [1, 1]], "marker"),
+        ([[-1, 1], [-1, 1]], "right wheel"),
+        ([[1, -1], [1, -1]], "left wheel"),
+    ],
+)
+def test_wheels_that_push_the_wrong_way(log, signs, words):
+    (line,) = said(log, np.asarray(DRIVE.gain) * np.array(signs))
+    assert words in line
+
+
+def test_millimetres_for_metres(log):
+    large = log._replace(x=1e3 * log.x, y=1e3 * log.y)
+    (line,) = said(large, np.asarray(DRIVE.gain) * np.array([[1e3], [1.0]]))
+    assert "millimetres" in line
+
+
+@pytest.mark.parametrize(("delay", "rows"), [(0.02, None), (0.07, 2), (0.1, 3), (0.2, 6)])
+def test_delays_of_several_rows(delay, rows):
+    lines = said(made(effect=Effect("transport_delay", {"delay": delay})))
+    assert lines == () if rows is None else f"only {rows} rows" in lines[0]
+
+
+def test_a_motor_lag_is_no_delay():
+    assert said(made(effect=Effect("motor_lag", {"time_constant": 0.06}))) == ()
+
+
+@pytest.mark.parametrize("error", [0.0, 0.01])
+def test_wheel_odometry(error):
+    exact, rng = made(noise=None), np.random.default_rng(0)
+    moved = motions(exact)
+    along, turn = (part * (1.0 + error * rng.normal(size=599)) for part in (moved.along(), moved.turn))
+    theta = np.concatenate([[0.0], np.cumsum(turn)])
+    middle = theta[:-1] + 0.5 * turn
+    x, y = (np.concatenate([[0.0], np.cumsum(along * side(middle))]) for side in (np.cos, np.sin))
+    (line,) = said(Log(exact.t, exact.u_r, exact.u_l, x, y, theta, exact.run))
+    assert "odometry" in line

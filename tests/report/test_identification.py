@@ -1,0 +1,51 @@
+"""The page of an identification holds what the program printed, and its pictures."""
+
+import numpy as np
+import pytest
+
+from jaxident.array_types import Pose
+from jaxident.errors import InputError
+from jaxident.estimation.identify import Identification
+from jaxident.estimation.likelihood import Innovations
+from jaxident.estimation.maximum_likelihood import Fit
+from jaxident.estimation.verdict import Verdict
+from jaxident.log import make_log
+from jaxident.report.identification import write_identification
+from jaxident.robot.drive import Physical
+from jaxident.robot.model import Model
+
+VERDICTS = [
+    Verdict("rate_1", 0.5, 0.49, 0.51, "determined"),
+    Verdict("dead_zone_r", 0.2, 0.0, 0.9, "not determined", "this input moves too little by it"),
+]
+
+
+def made():
+    """Two runs of different lengths, and residuals of white noise."""
+    rng = np.random.default_rng(0)
+    logs = [make_log(0.1 * np.arange(n), *rng.normal(size=(2, n)), *rng.normal(size=(3, n))) for n in (60, 80)]
+    normalised = rng.normal(size=(2, 3, 80))
+    normalised[0, :, 60:] = 0.0
+    residuals = Pose(*(0.01 * np.concatenate([normalised[0, k, :60], normalised[1, k]]) for k in range(3)))
+    fit = Fit(None, None, None, None, Innovations(normalised, 0.0 * normalised), True, 5)
+    model = Model(0.1, Physical(np.ones(2), np.ones((2, 2))), np.array([0.2, 0.1]))
+    return Identification(model, None, residuals, True, fit=fit, suspicions=("the heading is odd",)), logs
+
+
+def test_page_holds_parameters_doubts_tests_and_pictures(tmp_path):
+    found, logs = made()
+    (path,) = write_identification(found, logs, VERDICTS, tmp_path / "page.html")
+    text = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert path == str(tmp_path / "page.html")
+    for words in ("1 of 2 numbers are determined", "not determined: this input moves", "The heading is odd.", "white"):
+        assert words in text
+    assert text.count("<img") == 4
+    write_identification(found._replace(suspicions=(), ok=False), logs, VERDICTS, tmp_path / "page.html")
+    text = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "Nothing speaks against it. The fit did not converge" in text
+
+
+def test_the_papers_method_has_no_page(tmp_path):
+    found, logs = made()
+    with pytest.raises(InputError, match="maximum likelihood"):
+        write_identification(found._replace(fit=None), logs, VERDICTS, tmp_path / "page.html")
