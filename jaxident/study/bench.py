@@ -33,15 +33,15 @@ BLOCK = 512
 TRIAL_BLOCK = 125
 """Whole trials at a time; the search for start values takes fewer of them at once by itself."""
 
-FITS, FIT_SAMPLES, FIT_BLOCK = 64, 1000, 32
+FITS, FIT_SAMPLES, FIT_BLOCK, FIT_REPEATS = 64, 1000, 32, 3
 REPEATS = 7
 
 
 class Bench(NamedTuple):
     """Nanoseconds per trial-sample of each stage (1024 trials of 2000 samples, double precision), whole trials per
-    second (1000 samples each, noise drawn, start values searched), milliseconds per search for start values, and per
-    maximum-likelihood fit in a batch of 64 runs of 1000 samples, each the median of REPEATS; seconds that the whole
-    trial took to compile; devices and versions."""
+    second (1000 samples each, noise drawn, start values searched), milliseconds per search for start values, each the
+    median of REPEATS; milliseconds per maximum-likelihood fit in a batch of 64 runs of 1000 samples, the median of
+    FIT_REPEATS; seconds that the whole trial took to compile; devices and versions."""
 
     simulate_ns: float
     path_length_ns: float
@@ -146,7 +146,7 @@ def maximum_likelihood_ms(robot: Model, key: Array) -> float:
         return fit_runs(Runs(period, command, pose, jnp.ones((1, FIT_SAMPLES), bool)), jnp.asarray(D_MAX))
 
     blocks = noisy_runs(robot, key, FIT_SAMPLES, FITS, FIT_BLOCK)
-    return 1e3 * _time(jax.jit(jax.vmap(fit)), blocks)[1] / FITS
+    return 1e3 * _time(jax.jit(jax.vmap(fit)), blocks, FIT_REPEATS)[1] / FITS
 
 
 def bench(robot: Model, *, trials: int = 1000, seed: int = 0) -> Bench:
@@ -166,11 +166,13 @@ def bench(robot: Model, *, trials: int = 1000, seed: int = 0) -> Bench:
     )
 
 
-def _time(function: Callable[..., Any], blocks: list[tuple[Any, ...]]) -> tuple[list[Any], float]:
-    """The results on all blocks, and the median of REPEATS times [s] after a first call."""
+def _time(
+    function: Callable[..., Any], blocks: list[tuple[Any, ...]], repeats: int | None = None
+) -> tuple[list[Any], float]:
+    """The results on all blocks, and the median of some times [s], REPEATS unless said, after a first call."""
     results = in_parallel(function, blocks)
     seconds = []
-    for _ in range(REPEATS):
+    for _ in range(repeats or REPEATS):
         begin = time.perf_counter()
         in_parallel(function, blocks)
         seconds.append(time.perf_counter() - begin)
