@@ -1,6 +1,8 @@
 """Arithmetic that is finite, differentiable and fast where the textbook form is not."""
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -111,3 +113,37 @@ def _polynomial(x: Array, coefficients: list[float]) -> Array:
     for coefficient in reversed(coefficients[:-1]):
         value = value * x + coefficient
     return value
+
+
+def in_blocks(function: Callable[..., Any], size: int) -> Callable[..., Any]:
+    """`function` of arrays; mapped over many trials on a CPU it takes them `size` at a time at most, one block after
+    the other, so that its intermediate arrays stay in the cache. The results are those of a plain vmap.
+
+    Elsewhere all trials run at once. A block takes every so-manieth trial, which keeps a trial axis that is cut over
+    devices where it is.
+    """
+    mapped = jax.custom_batching.custom_vmap(function)
+
+    @mapped.def_vmap
+    def many(trials, batched, *arguments):
+        leaves, tree = jax.tree.flatten(arguments)
+        axes = [0 if flag else None for flag in jax.tree.leaves(batched)]
+        over = [leaf for leaf, axis in zip(leaves, axes, strict=True) if axis == 0]
+
+        def block(over):
+            rest = iter(over)
+            own = [leaf if axis is None else next(rest) for leaf, axis in zip(leaves, axes, strict=True)]
+            return jax.vmap(lambda *own: function(*jax.tree.unflatten(tree, own)), in_axes=axes)(*own)
+
+        blocks = -(-trials // size) if jax.default_backend() == "cpu" else 1
+        rows = -(-trials // blocks)
+        if blocks > 1:
+            filled = jnp.minimum(jnp.arange(rows * blocks), trials - 1)
+            cut = [jnp.swapaxes(leaf[filled].reshape(rows, blocks, *leaf.shape[1:]), 0, 1) for leaf in over]
+            found = jax.lax.map(block, cut)
+            found = jax.tree.map(lambda leaf: jnp.swapaxes(leaf, 0, 1).reshape(-1, *leaf.shape[2:])[:trials], found)
+        else:
+            found = block(over)
+        return found, jax.tree.map(lambda _: True, found)
+
+    return mapped

@@ -10,6 +10,7 @@ from jaxident.numerics import (
     GAUSS_NODES,
     GAUSS_WEIGHTS,
     hold_integrals,
+    in_blocks,
     require_float64,
     safe_divide,
     safe_norm,
@@ -127,3 +128,22 @@ def test_double_precision_is_asked_for_by_name():
     require_float64("fit")
     with jax.enable_x64(False), pytest.raises(RuntimeError, match=r"fit needs .*jax_enable_x64"):
         require_float64("fit")
+
+
+def test_blocks_of_trials_give_what_all_at_once_give():
+    """Also where the last block is not full, an argument is shared by all trials, and maps are nested."""
+
+    def one(signals, weight):
+        return {"sum": signals["a"] @ weight, "mean": jnp.mean(signals["b"])}
+
+    key_a, key_b = jax.random.split(jax.random.key(0))
+    signals = {"a": jax.random.normal(key_a, (2, 23, 5)), "b": jax.random.normal(key_b, (2, 23, 4))}
+    weight = jnp.arange(5.0)
+
+    def run(function):
+        return jax.jit(jax.vmap(jax.vmap(function, in_axes=(0, None)), in_axes=(0, None)))(signals, weight)
+
+    jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, rtol=1e-14), run(in_blocks(one, 10)), run(one))
+    first = jax.tree.map(lambda leaf: leaf[0], signals)
+    few = jax.vmap(in_blocks(one, 30), in_axes=(0, None))(first, weight)
+    np.testing.assert_allclose(few["sum"], first["a"] @ weight, rtol=1e-14)

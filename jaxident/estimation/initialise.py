@@ -6,7 +6,8 @@ in one of the two readings of dl_hat and dtheta_hat of `readings`. The search ru
 alone; `projection` solves for everything else.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -16,18 +17,21 @@ import optimistix
 
 from jaxident.array_types import Array, Increment
 from jaxident.estimation.observations import Observations
-from jaxident.estimation.projection import Projected, linear_residual, profile, project
-from jaxident.estimation.readings import Reading, one_step, reading_of, usable
+from jaxident.estimation.projection import Projected, inputs_of, linear_residual, profile, project, triangle
+from jaxident.estimation.readings import Reading, free_run, one_step, reading_of, usable
+from jaxident.numerics import in_blocks
 from jaxident.robot.difference import Difference
 
-GRID = 21
-"""Dead zones of either wheel in the first look, over all of them."""
+COARSE, COARSE_WIDTHS = 21, (0.5, 0.11)
+"""Dead zones of either wheel in the first two windows, and half of these windows' widths over the largest dead zone:
+the first window takes all of them."""
 
-WINDOW, WINDOWS, FINER = 11, 15, 1.8
-"""The windows of WINDOW^2 dead zones that follow, each FINER times as fine as the one before."""
+FINE, FINE_WIDTHS = 7, tuple(0.025 * 0.016 ** (k / 5) for k in range(6))
+"""The same of the windows that follow. The last tells dead zones 1.3e-4 of the largest apart; levels of the commands,
+where the kinks are, are met exactly."""
 
-FIRST_WINDOW = 2.5
-"""Half-width of the first window in steps of the grid. The last tells dead zones 1e-5 of the largest apart."""
+BLOCKS = (40, 10)
+"""Trials at once, of the whole and within it of the search, where many are mapped: few enough for the cache."""
 
 POLES = (0.0, 0.4, 0.65, 0.8, 0.88, 0.94, 0.97, 0.985, 0.9925, 0.998)
 """Poles that a free run starts from: the time constant grows by a half or more from one to the next."""
@@ -35,7 +39,7 @@ POLES = (0.0, 0.4, 0.65, 0.8, 0.88, 0.94, 0.97, 0.985, 0.9925, 0.998)
 POLE_LIMIT = 0.9995
 """Largest pole that a window, which is right to first order alone, may suggest in free run."""
 
-MAX_STEPS = 4
+MAX_STEPS = 3
 RTOL, ATOL = 1e-9, 1e-10
 
 UNKNOWNS = 12
@@ -80,27 +84,50 @@ def initialise(observations: Observations, *, d_max: Array, reading: str = "one_
 
     J has kinks where a dead zone crosses a level of the commands, and local minima between them. A gradient sees
     neither: windows of dead zones, each finer than the last, find the lowest valley, and optimistix's
-    Levenberg-Marquardt its floor. Pure: runs under jit and vmap. Double precision.
+    Levenberg-Marquardt its floor, once with the dead zones that lie on a level held there. Pure: runs under jit and
+    vmap. Double precision.
+
+    Hot: takes one trial, observations (samples,). Many trials are best mapped all at once, because small arrays waste
+    most of a kernel's time; BLOCKS cuts them to what stays in a core's cache.
     """
-    read = reading_of(observations, reading)
+    reading_of(observations, reading)
+    return in_blocks(partial(_initialise, reading=reading), BLOCKS[0])(observations, jnp.asarray(d_max))
+
+
+def _initialise(observations: Observations, d_max: Array, reading: str) -> Setup:
     weight, count = _linear_weight(observations)
+    search = in_blocks(partial(_search, reading=reading), BLOCKS[1])
+    start, on_level = search(observations, weight, d_max)
+    read = reading_of(observations, reading)
     cost = _cost(observations, read, weight)
-    if reading == "one_step":
-        start = _overview(cost, jnp.zeros(2), d_max)
-    else:
-        coarse = _overview(_cost(observations, one_step(observations), weight), jnp.zeros(2), d_max)
-        start = _overview(cost, _best_poles(cost, coarse), d_max)
-    start = _windows(cost, start, d_max)
-    refined, steps = _refine(cost, read, d_max, start)
-    point, lowest, numerator = cost.best(jnp.stack([start, refined]))
+    refined, steps = jax.vmap(lambda held: _refine(cost, read, d_max, start, held))(
+        jnp.stack([on_level, jnp.zeros_like(on_level)])
+    )
+    point, lowest, numerator = cost.best(jnp.concatenate([start[None], refined]))
     return Setup(
         difference=Difference(point[2:], numerator[:, :2], -numerator[:, 2:]),
         dead_zone=point[:2],
         cost=lowest,
         weight=Increment(weight[0], weight[1]),
         ok=jnp.isfinite(lowest) & jnp.all(jnp.isfinite(numerator)) & (count > UNKNOWNS),
-        steps=steps,
+        steps=jnp.max(steps),
     )
+
+
+def _search(observations: Observations, weight: Array, d_max: Array, reading: str) -> tuple[Array, Array]:
+    """The lowest point (4,) of finer and finer windows, and which of its dead zones lie on a level of the commands."""
+    sizes = jnp.abs(jnp.stack(observations.command))
+    levels = jnp.where(sizes <= d_max, sizes, 0.0)
+    coarse, fine = (d_max * jnp.array(widths) for widths in (COARSE_WIDTHS, FINE_WIDTHS))
+    cost = _cost(observations, one_step(observations), weight)
+    point = jnp.stack([0.5 * d_max, 0.5 * d_max, 0.0, 0.0])
+    if reading == "free_run":
+        point = _zoom(cost, point, levels, d_max, coarse[:1], COARSE)
+        cost = _cost(observations, free_run(observations), weight)
+        point = jnp.concatenate([jnp.full(2, 0.5 * d_max), _best_poles(cost, point)])
+    point = _zoom(cost, point, levels, d_max, coarse, COARSE)
+    point = _zoom(cost, point, levels, d_max, fine, FINE)
+    return point, jnp.any(levels == point[:2, None], axis=1)
 
 
 def _linear_weight(observations: Observations) -> tuple[Array, Array]:
@@ -114,12 +141,11 @@ def _linear_weight(observations: Observations) -> tuple[Array, Array]:
 
 def _cost(observations: Observations, reading: Reading, weight: Array) -> Cost:
     limit = jnp.abs(reading.pole(jnp.asarray(jnp.inf))) * POLE_LIMIT
+    inputs, increments = inputs_of(observations), jnp.stack(observations.increment)
 
     def around(point: Array, rights: Array, lefts: Array) -> tuple[Array, Array]:
-        squares, poles = profile(reading, observations, point, rights, lefts)
-        costs = jnp.sum(squares / weight[:, None, None] ** 2, axis=0)
-        pairs = jnp.meshgrid(rights, lefts, indexing="ij")
-        return costs, jnp.stack([*pairs, *jnp.clip(poles, -limit, limit)], axis=-1)
+        squares, poles = profile(reading, inputs, increments, point, rights, lefts)
+        return jnp.sum(squares / weight[:, None, None] ** 2, axis=0), jnp.clip(poles, -limit, limit)
 
     return Cost(lambda point: project(reading, observations, point), around, weight)
 
@@ -131,44 +157,48 @@ def _best_poles(cost: Cost, point: Array) -> Array:
     return poles[jnp.argmin(jnp.sum(left**2, axis=2), axis=0)]
 
 
-def _overview(cost: Cost, poles: Array, d_max: Array) -> Array:
-    """The lowest point (4,) of a grid over all dead zones, seen from its middle and some poles."""
-    widths = jnp.linspace(0.0, 1.0, GRID) * d_max
-    return _lowest(cost, jnp.concatenate([jnp.full(2, 0.5 * d_max), poles]), (widths, widths))
+def _zoom(cost: Cost, point: Array, levels: Array, d_max: Array, halves: Array, count: int) -> Array:
+    """The lowest point (4,) that windows of some half-widths (n,) find, each around the best of the one before.
+
+    A window holds `count` dead zones of either wheel and the level of its commands, levels (2, n), that lies nearest
+    to the middle: a minimum on a kink is met, not approached.
+    """
+
+    def look(centre, half):
+        grid = jnp.clip(centre[:2, None] + half * jnp.linspace(-1.0, 1.0, count), 0.0, d_max)
+        nearest = jnp.argmin(jnp.abs(levels - centre[:2, None]), axis=1)
+        kinks = jnp.take_along_axis(levels, nearest[:, None], axis=1)
+        widths = jnp.concatenate([grid, kinks], axis=1)
+        costs, poles = cost.around(centre, *widths)
+        right, left = jnp.unravel_index(jnp.argmin(costs), costs.shape)
+        return jnp.stack([widths[0, right], widths[1, left], *poles[:, right, left]]), None
+
+    return jax.lax.scan(look, point, halves)[0]
 
 
-def _windows(cost: Cost, point: Array, d_max: Array) -> Array:
-    """The lowest point (4,) that ever finer windows find, each around the best of the one before."""
-    offsets = FIRST_WINDOW * d_max / (GRID - 1) * jnp.linspace(-1.0, 1.0, WINDOW)
+def _refine(cost: Cost, reading: Reading, d_max: Array, start: Array, held: Array) -> tuple[Array, Array]:
+    """Levenberg-Marquardt from one point, in coordinates that cannot leave the bounds: the end, and the steps.
 
-    def look(k, centre):
-        return _lowest(cost, centre, [jnp.clip(d + FINER ** -(1.0 * k) * offsets, 0.0, d_max) for d in centre[:2]])
+    held (2,): dead zones that stay. The residuals and their slopes go to the search as four numbers a channel with
+    the same inner products.
+    """
 
-    return jax.lax.fori_loop(0, WINDOWS, look, point)
-
-
-def _lowest(cost: Cost, centre: Array, widths: Sequence[Array]) -> Array:
-    """The best point for all pairs of a right and a left dead zone, seen from a centre (4,)."""
-    costs, points = cost.around(centre, *widths)
-    return points.reshape(-1, 4)[jnp.argmin(costs)]
-
-
-def _refine(cost: Cost, reading: Reading, d_max: Array, start: Array) -> tuple[Array, Array]:
-    """Levenberg-Marquardt from one point, in coordinates that cannot leave the bounds: the end, and the steps."""
+    def triangles(point):
+        return jax.vmap(triangle)(cost.left(point).products / cost.weight[:, None, None] ** 2)
 
     @jax.custom_jvp
     def residual(point):
-        return cost.left(point).residual / cost.weight[:, None]
+        return triangles(point)[:, :, 3]
 
     @residual.defjvp
     def _(primals, tangents):
-        left = cost.left(*primals)
+        table = triangles(*primals)
         width, pole = tangents[0][:2], tangents[0][2:, None]
-        slope = jnp.einsum("cds,d->cs", left.slope[:, :2], width) + pole * left.slope[:, 2]
-        return left.residual / cost.weight[:, None], slope / cost.weight[:, None]
+        return table[:, :, 3], table[:, :, :2] @ width + pole * table[:, :, 2]
 
     def inside(coordinates):
-        return jnp.concatenate([d_max * jnp.sin(coordinates[:2]) ** 2, reading.pole(coordinates[2:])])
+        widths = jnp.where(held, start[:2], d_max * jnp.sin(coordinates[:2]) ** 2)
+        return jnp.concatenate([widths, reading.pole(coordinates[2:])])
 
     search: optimistix.Solution = optimistix.least_squares(
         lambda coordinates, _: residual(inside(coordinates)),

@@ -22,11 +22,12 @@ RIDGE = 1e-13
 
 class Projected(NamedTuple):
     """residual (2, samples) of both channels [m], [rad]; numerator (2, 4), the coefficients of m_r and m_l at k-1,
-    then at k-2; slope (2, 3, samples), of the residual by either dead zone and the channel's own pole."""
+    then at k-2; products (2, 4, 4), inner products of the residual's slopes by either dead zone and by the channel's
+    own pole, and of the residual itself."""
 
     residual: Any
     numerator: Any
-    slope: Any
+    products: Any
 
 
 def project(reading: Reading, observations: Observations, point: Array) -> Projected:
@@ -36,16 +37,32 @@ def project(reading: Reading, observations: Observations, point: Array) -> Proje
     passed = dead_zone(commands, widths)
     switch = jnp.where(jnp.abs(commands) > widths, -jnp.sign(commands), 0.0)
 
+    signals = jnp.concatenate([passed, switch])
+
     def channel(pole: Array, increments: Array) -> Projected:
-        regression = reading.regress(pole, jnp.vstack([passed, switch]), increments)
-        inputs, switches = regression.columns[:4], regression.columns[4:]
-        weights, rest = _fit(inputs, regression.target[None])
-        first = weights[0]
-        by_width = (first[:, None] * switches).reshape(2, 2, -1).sum(axis=0)
-        weights, left = _fit(inputs, jnp.vstack([by_width, regression.slope(first), rest]))
-        return Projected(left[3], first + weights[3], -left[:3])
+        columns, target, slope_under = reading.regress(pole, signals, increments)
+        own = columns @ columns.T
+        first = _weights(own[:4, :4], (columns @ target)[:4, None])[0][0]
+        rest = target - jnp.concatenate([first, jnp.zeros(4)]) @ columns
+        # The fit repeated on what it left loses no digits. Its targets are mixed from products, not from signals.
+        behind = jnp.stack([slope_under(first), rest])
+        across = columns @ behind.T
+        table = jnp.block([[own, across], [across.T, behind @ behind.T]])
+        mixture = _mixture(first)
+        across = table[:4] @ mixture.T
+        weights, products = _weights(own[:4, :4], across, mixture @ table @ mixture.T)
+        return Projected(rest - jnp.concatenate([weights[3], jnp.zeros(4)]) @ columns, first + weights[3], products)
 
     return jax.vmap(channel)(point[2:], jnp.stack(observations.increment))
+
+
+def _mixture(first: Array) -> Array:
+    """The residual's slopes by either dead zone and the pole, and the residual, as mixtures (4, 10) of four passed
+    inputs, their four switches, the prediction's slope by the pole, and the residual; first (4,): the weights."""
+    wheels = -jnp.tile(jnp.eye(2), 2) * first
+    return jnp.block(
+        [[jnp.zeros((2, 4)), wheels, jnp.zeros((2, 2))], [jnp.zeros((2, 8)), jnp.diag(jnp.array([-1.0, 1.0]))]]
+    )
 
 
 def linear_residual(reading: Reading, observations: Observations, increments: Array) -> Array:
@@ -53,14 +70,32 @@ def linear_residual(reading: Reading, observations: Observations, increments: Ar
     commands = jnp.stack([*observations.command, *observations.command_before])
     regression = reading.regress(jnp.zeros(()), commands, increments)
     columns = jnp.vstack([regression.columns, regression.slope(jnp.zeros(0))])
-    return _fit(columns, regression.target[None])[1][0]
+    return regression.target - _fit(columns, regression.target) @ columns
 
 
-def _fit(columns: Array, targets: Array) -> tuple[Array, Array]:
-    """Weights (t, n) of columns (n, samples) in targets (t, samples), and what they leave of these."""
-    table = jnp.vstack([columns, targets])
-    weights = eliminate(table @ table.T, len(columns))[: len(columns), len(columns) :].T
-    return weights, targets - weights @ columns
+def _fit(columns: Array, target: Array) -> Array:
+    """Least-squares weights (n,) of columns (n, samples) in a target (samples,)."""
+    return _weights(columns @ columns.T, (columns @ target)[:, None])[0][0]
+
+
+def _weights(own: Array, across: Array, among: Array | None = None) -> tuple[Array, Array]:
+    """From inner products of n columns (n, n), of these with t targets (n, t), and of the targets (t, t): weights
+    (t, n), and the inner products (t, t) of what they leave."""
+    n, t = across.shape
+    table = jnp.block([[own, across], [across.T, jnp.zeros((t, t)) if among is None else among]])
+    table = eliminate(table, n)
+    return table[:n, n:].T, table[n:, n:]
+
+
+def triangle(products: Array) -> Array:
+    """The upper triangular R (n, n) with R' R = products (n, n): n numbers a signal that stand for its samples where
+    inner products alone count. Dependent signals leave zeros."""
+    left, rows = products, []
+    for i in range(len(products)):
+        row = left[i] * jnp.sqrt(_inverse(left[i, i], products[i, i]))
+        rows.append(jnp.where(jnp.arange(len(products)) < i, 0.0, row))
+        left = left - rows[-1][:, None] * rows[-1]
+    return jnp.stack(rows)
 
 
 def eliminate(table: Array, count: int) -> Array:
@@ -78,28 +113,38 @@ def eliminate(table: Array, count: int) -> Array:
     return table
 
 
-def profile(reading: Reading, observations: Observations, point: Array, rights: Array, lefts: Array):
+def inputs_of(observations: Observations) -> Array:
+    """Commands (2, 2, samples) of either wheel, at k-1 and at k-2: what `profile` works on, laid out once."""
+    pairs = zip(observations.command, observations.command_before, strict=True)
+    return jnp.stack([jnp.stack(pair) for pair in pairs])
+
+
+def profile(reading: Reading, inputs: Array, increments: Array, point: Array, rights: Array, lefts: Array):
     """Sums of squared residuals and best poles, both (2, n, m), for all pairs of n right and m left dead zones.
 
-    The poles are eliminated like the numerators: exactly in one step, to first order around `point` in free run. A
-    few products of all signals serve every pair; cancellation leaves an error of about 1e-13 of the target's square.
+    inputs (2, 2, samples) as `inputs_of` lays them out, increments (2, samples). The poles are eliminated like the
+    numerators: exactly in one step, to first order around `point` in free run. A few products of all signals serve
+    every pair; cancellation leaves an error of about 1e-13 of the target's square. A hot loop: joined and sliced
+    arrays cost more here than all arithmetic, so that signals are made in one sweep and multiplied as they lie.
     """
-    commands = observations.command, observations.command_before
-    centre = jnp.vstack([dead_zone(jnp.stack(u), point[:2, None]) for u in commands])
-    right, left = (
-        jnp.vstack([dead_zone(u[wheel], widths[:, None]) for u in commands])
-        for wheel, widths in enumerate((rights, lefts))
-    )
+    centre = dead_zone(inputs, point[:2, None, None]).reshape(4, -1)
+    passed = [_pass(*side) for side in zip(inputs, (rights, lefts), strict=True)]
 
     def channel(pole: Array, increments: Array) -> tuple[Array, Array]:
         columns, target, slope_under = reading.regress(pole, centre, increments)
-        behind = jnp.stack([slope_under(_fit(columns, target[None])[0][0]), target])
-        right_columns, left_columns = (reading.regress(pole, side, increments).columns for side in (right, left))
-        products = _schur(_pairs(right_columns, left_columns, behind), 4, 6)
+        behind = jnp.stack([slope_under(_fit(columns, target)), target])
+        right, left = (reading.regress(pole, signals, increments).columns for signals in passed)
+        products = _schur(_pairs(right, left, behind), 4, 6)
         move = safe_divide(products[4, 5], products[4, 4], 0.0)
         return jnp.maximum(products[5, 5] - move * products[4, 5], 0.0), pole + move
 
-    return jax.vmap(channel)(point[2:], jnp.stack(observations.increment))
+    return jax.vmap(channel)(point[2:], increments)
+
+
+def _pass(commands: Array, widths: Array) -> Array:
+    """What passes n dead zones of one wheel's commands (2, samples): (2 n, samples), those of k-1 first."""
+    now, limits = commands[:, None], widths[:, None]
+    return (now - jnp.clip(now, -limits, limits)).reshape(-1, commands.shape[1])
 
 
 Products = dict[tuple[int, int], Array]
@@ -126,19 +171,25 @@ def _pairs(right: Array, left: Array, behind: Array) -> Products:
     every pair of a right and a left dead zone: entries broadcast to (n, m). The signals of k-1 come first, then those
     of k-2. Products of inputs alone are shared where their channels are."""
     cross, right_behind, left_behind, own = right @ left.T, right @ behind.T, left @ behind.T, behind @ behind.T
-    n, m = len(right) // 2, len(left) // 2
-    rights, lefts = (slice(0, n), slice(n, None)), (slice(0, m), slice(m, None))
+    (n, right_own), (m, left_own) = (_own(side) for side in (right, left))
     entries: Products = {}
     for i in range(2):
         for j in range(2):
-            entries[i, 2 + j] = cross[rights[i], lefts[j]]
-            entries[i, 4 + j] = right_behind[rights[i], j, None]
-            entries[2 + i, 4 + j] = left_behind[None, lefts[i], j]
+            entries[i, 2 + j] = cross[i * n : (i + 1) * n, j * m : (j + 1) * m]
+            entries[i, 4 + j] = right_behind[i * n : (i + 1) * n, j, None]
+            entries[2 + i, 4 + j] = left_behind[None, i * m : (i + 1) * m, j]
             if i <= j:
-                entries[i, j] = jnp.sum(right[rights[i]] * right[rights[j]], axis=1)[:, None]
-                entries[2 + i, 2 + j] = jnp.sum(left[lefts[i]] * left[lefts[j]], axis=1)[None]
+                entries[i, j], entries[2 + i, 2 + j] = right_own[i + j, :, None], left_own[None, i + j]
                 entries[4 + i, 4 + j] = own[i, j]
     return entries
+
+
+def _own(side: Array) -> tuple[int, Array]:
+    """How many dead zones n a wheel's signals (2 n, samples) have, and the inner products (3, n) of those of k-1 with
+    themselves, of k-1 with k-2, of k-2 with themselves."""
+    now, before = side.reshape(2, -1, side.shape[1])
+    products = jnp.stack([now * now, now * before, before * before])
+    return len(now), products @ jnp.ones(side.shape[1])  # a product adds up faster than a sum
 
 
 def _inverse(pivot: Array, size: Array) -> Array:

@@ -41,7 +41,8 @@ class UnitNoise(NamedTuple):
 def draw_noise(key: Array, samples: int) -> UnitNoise:
     """Unit noise for a run; the same key gives the same draws at every noise level.
 
-    Drawn in single precision, which takes half the time and cuts a draw at 1e-7 of a standard deviation.
+    Hot: drawn in single precision, which takes half the time and cuts a draw at 1e-7 of a standard deviation; one run
+    (samples,) from one key, so that a run's noise does not depend on which others are drawn beside it.
     """
     draws = (jax.random.normal(k, (samples,), jnp.float32) for k in jax.random.split(key, 5))
     return UnitNoise(*(draw.astype(float) for draw in draws))

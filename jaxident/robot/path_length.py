@@ -20,6 +20,9 @@ def path_length(poses: Pose) -> Increment:
     Direction by PAPER (9), length by a four-node Gauss-Legendre rule. Against a true arc the relative error grows with
     the fourth power of the turn: 5e-7 at a tenth of a radian, 3e-4 at half. A missing pose (NaN) makes both increments
     beside it NaN.
+
+    Hot: elementwise along the samples, so trials may follow on a last axis; there `c[:-1]` and `c[1:]` are whole rows
+    of contiguous trials and everything is one sweep, while samples last would leave odd ends in every trial.
     """
     heading = sin_cos(poses.theta)
     start, end = Pose(*(c[:-1] for c in poses)), Pose(*(c[1:] for c in poses))

@@ -12,7 +12,9 @@ import jax.numpy as jnp
 from jaxident.array_types import AT_REST, Array, Pose, Wheels
 from jaxident.estimation import recursive
 from jaxident.estimation.initialise import Setup, initialise
+from jaxident.estimation.maximum_likelihood import Fit, fit_runs
 from jaxident.estimation.observations import Observations, complete_observations, observe_log
+from jaxident.estimation.runs import Runs
 from jaxident.log import Log
 from jaxident.numerics import require_float64
 from jaxident.robot.excitation import multilevel
@@ -28,14 +30,18 @@ CAMERA = Noise(1e-5, 1e-4)
 BLOCK = 512
 """Trials at a time in the stages: enough to pay for the start of each kernel, few enough to stay in the cache."""
 
-TRIAL_BLOCK = 20
+TRIAL_BLOCK = 125
+"""Whole trials at a time; the search for start values takes fewer of them at once by itself."""
+
+FITS, FIT_SAMPLES, FIT_BLOCK, FIT_REPEATS = 64, 1000, 32, 3
 REPEATS = 7
 
 
 class Bench(NamedTuple):
     """Nanoseconds per trial-sample of each stage (1024 trials of 2000 samples, double precision), whole trials per
-    second (1000 samples each, noise drawn, start values searched), milliseconds per search, each the median of
-    REPEATS; seconds that the whole trial took to compile; devices and versions."""
+    second (1000 samples each, noise drawn, start values searched), milliseconds per search for start values, each the
+    median of REPEATS; milliseconds per maximum-likelihood fit in a batch of 64 runs of 1000 samples, the median of
+    FIT_REPEATS; seconds that the whole trial took to compile; devices and versions."""
 
     simulate_ns: float
     path_length_ns: float
@@ -43,7 +49,7 @@ class Bench(NamedTuple):
     noise_ns: float
     trials_per_s: float
     initialise_ms: float
-    maximum_likelihood_ms: float | None
+    maximum_likelihood_ms: float
     compile_s: float
     devices: list[str]
     versions: dict[str, str]
@@ -109,44 +115,64 @@ def whole_trials(robot: Model, key: Array, count: int) -> tuple[float, float]:
     return count / _time(compiled, keys)[1], compile_s
 
 
+def noisy_runs(robot: Model, key: Array, samples: int, count: int, block: int) -> list[tuple[Wheels, Pose]]:
+    """Blocks of noisy runs (block, samples), `count` in all, each under commands of its own."""
+    period = jnp.asarray(robot.sample_period)
+
+    def one(key: Array) -> tuple[Wheels, Pose]:
+        key_input, key_noise = jax.random.split(key)
+        command = multilevel(key_input, samples)
+        pose = run_physical(robot, command, period, AT_REST).pose
+        return command, observe(pose, CAMERA, draw_noise(key_noise, samples), period)
+
+    keys = jax.random.split(key, (count // block, block))
+    return in_parallel(jax.jit(jax.vmap(one)), [(row,) for row in keys])
+
+
 def start_value_ms(robot: Model, key: Array, count: int) -> float:
     """Milliseconds that the search for start values takes per trial in a batch of `count`."""
     period = jnp.asarray(robot.sample_period)
-
-    def noisy(key: Array) -> tuple[Wheels, Pose]:
-        key_input, key_noise = jax.random.split(key)
-        command = multilevel(key_input, SETUP_ROWS)
-        pose = run_physical(robot, command, period, AT_REST).pose
-        return command, observe(pose, CAMERA, draw_noise(key_noise, SETUP_ROWS), period)
-
-    keys = jax.random.split(key, (count // TRIAL_BLOCK, TRIAL_BLOCK))
-    blocks = in_parallel(jax.jit(jax.vmap(noisy)), [(block,) for block in keys])
+    blocks = noisy_runs(robot, key, SETUP_ROWS, count, TRIAL_BLOCK)
     search = jax.jit(jax.vmap(lambda command, pose: start_values(command, pose, period)))
     return 1e3 * _time(search, blocks)[1] / count
+
+
+def maximum_likelihood_ms(robot: Model, key: Array) -> float:
+    """Milliseconds that a maximum-likelihood fit takes per run in a batch of FITS runs of FIT_SAMPLES samples."""
+    period = jnp.asarray(robot.sample_period)
+
+    def fit(command: Wheels, pose: Pose) -> Fit:
+        command, pose = jax.tree.map(lambda column: column[None], (command, pose))
+        return fit_runs(Runs(period, command, pose, jnp.ones((1, FIT_SAMPLES), bool)), jnp.asarray(D_MAX))
+
+    blocks = noisy_runs(robot, key, FIT_SAMPLES, FITS, FIT_BLOCK)
+    return 1e3 * _time(jax.jit(jax.vmap(fit)), blocks, FIT_REPEATS)[1] / FITS
 
 
 def bench(robot: Model, *, trials: int = 1000, seed: int = 0) -> Bench:
     """All figures; `trials` whole trials, rounded up to whole blocks. Needs double precision."""
     require_float64("bench")
     trials = -(-trials // TRIAL_BLOCK) * TRIAL_BLOCK
-    keys = jax.random.split(jax.random.key(seed), 3)
+    keys = jax.random.split(jax.random.key(seed), 4)
     per_second, compile_s = whole_trials(robot, keys[1], trials)
     return Bench(
         **stages(robot, keys[0]),
         trials_per_s=per_second,
         initialise_ms=start_value_ms(robot, keys[2], trials),
-        maximum_likelihood_ms=None,
+        maximum_likelihood_ms=maximum_likelihood_ms(robot, keys[3]),
         compile_s=compile_s,
         devices=[str(device) for device in jax.devices()],
         versions={name: version(name) for name in ("jaxident", "jax", "jaxlib", "numpy", "optimistix")},
     )
 
 
-def _time(function: Callable[..., Any], blocks: list[tuple[Any, ...]]) -> tuple[list[Any], float]:
-    """The results on all blocks, and the median of REPEATS times [s] after a first call."""
+def _time(
+    function: Callable[..., Any], blocks: list[tuple[Any, ...]], repeats: int | None = None
+) -> tuple[list[Any], float]:
+    """The results on all blocks, and the median of some times [s], REPEATS unless said, after a first call."""
     results = in_parallel(function, blocks)
     seconds = []
-    for _ in range(REPEATS):
+    for _ in range(repeats or REPEATS):
         begin = time.perf_counter()
         in_parallel(function, blocks)
         seconds.append(time.perf_counter() - begin)

@@ -123,4 +123,4 @@ def test_corners_stay_finite_and_are_flagged(reading):
 def test_unknown_reading_is_refused():
     log = arrays(make_log(np.arange(30.0), *(np.zeros(30) for _ in range(5))))
     with pytest.raises(InputError, match="reading 'both': one of free_run, one_step"):
-        initialise(observe_log(log), d_max=D_MAX, reading="both")
+        jax.eval_shape(lambda log: initialise(observe_log(log), d_max=D_MAX, reading="both"), log)

@@ -15,7 +15,8 @@ ROBOT = load_model("published")
 def small(monkeypatch):
     for name, value in {"TRIALS": 4, "SAMPLES": 240, "BLOCK": 2, "REPEATS": 1, "TRIAL_SAMPLES": 260}.items():
         monkeypatch.setattr(bench, name, value)
-    monkeypatch.setattr(bench, "TRIAL_BLOCK", 2)
+    for name, value in {"TRIAL_BLOCK": 2, "FITS": 2, "FIT_SAMPLES": 240, "FIT_BLOCK": 1, "FIT_REPEATS": 1}.items():
+        monkeypatch.setattr(bench, name, value)
 
 
 def test_whole_trials_end_near_the_robot(small):
@@ -30,3 +31,9 @@ def test_every_stage_has_a_figure(small):
     figures = bench.stages(ROBOT, jax.random.key(0))
     assert set(figures) == {"simulate_ns", "path_length_ns", "rls_ns", "noise_ns"}
     assert all(0.0 < value < np.inf for value in figures.values())
+
+
+@pytest.mark.slow
+def test_the_searches_have_figures(small):
+    assert 0.0 < bench.start_value_ms(ROBOT, jax.random.key(0), 4) < np.inf
+    assert 0.0 < bench.maximum_likelihood_ms(ROBOT, jax.random.key(0)) < np.inf
