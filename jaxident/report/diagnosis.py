@@ -120,6 +120,8 @@ def _gap(found: Diagnosis) -> Section:
             channels = [kept, *(kept[:, [k]] for k in range(len(CHANNELS)))]
             levels[label] = [float(np.mean(part)) for part in channels]
             intervals[label] = [interval(part) for part in channels]
+    if not levels:
+        return Section("How large the gap is", ["No stretch of the logs is left to judge by."])
     floor = [gap.floor, *np.asarray(gap.replay.channels).mean(axis=0).tolist()]
     rows = ("all channels", *CHANNELS)
     figure, ax = plot.figure(size=(6.3, 2.9))

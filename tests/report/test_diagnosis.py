@@ -1,13 +1,14 @@
 """The page of a diagnosis, of one made up for each verdict."""
 
+import numpy as np
 import pytest
+from support.diagnoses import LARGEST, VERDICTS, made_up
 
 from jaxident.diagnosis.visible import smallest_sizes
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.report import Figure, Table, render
 from jaxident.report.diagnosis import diagnosis_page, lead
 from jaxident.report.words import EFFECTS, SITES, chance, measured, number, parameters, percent, together
-from tests.support.diagnoses import LARGEST, VERDICTS, made_up
 
 LEADS = {
     "no_gap": "No gap: the model predicts these logs 1 s ahead as well as noise allows",
@@ -67,6 +68,17 @@ def test_models_that_were_not_given_are_not_shown():
     (beside,) = tables(section(diagnosis_page(made_up("effects", given=True), "runs"), "How large the gap is"))
     assert [row[0] for row in alone.rows] == ["nominal model", "corrected model", "floor"]
     assert [row[0] for row in beside.rows] == ["as given", "parameters refitted", "corrected model", "floor"]
+
+
+def test_nothing_seen_is_a_page_too():
+    found = made_up("undecided", given=True)
+    nothing = np.full((3, 4, 3), np.nan)
+    replay = found.gap.replay._replace(channels=nothing[0])
+    gap = found.gap._replace(errors=nothing, floor=np.nan, floor_interval=(np.nan, np.nan), replay=replay)
+    finding = found.finding._replace(candidates={(): found.finding.candidates[()]})
+    page = diagnosis_page(found._replace(gap=gap, finding=finding, shrinks={}), "runs")
+    assert section(page, "How large the gap is").blocks == ["No stretch of the logs is left to judge by."]
+    assert "No effect promised enough to be fitted." in section(page, "Which effect causes it").blocks
 
 
 def test_what_stays_unexplained_is_told():
