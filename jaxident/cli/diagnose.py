@@ -36,6 +36,8 @@ def command(logs, sim, model, horizon, out, seed):
     from jaxident.files.diagnosis import diagnosis_to_dict
     from jaxident.files.logs import find_simulated, read_log, read_logs
     from jaxident.files.models import load_model, save_model
+    from jaxident.report.diagnosis import diagnosis_page
+    from jaxident.report.page import write_page
 
     records = read_logs(logs)
     theirs = read_logs(sim) if sim else [read_log(path) for path in find_simulated(logs)]
@@ -53,6 +55,9 @@ def command(logs, sim, model, horizon, out, seed):
         path = os.path.join(out, f"{name}.json")
         save_model(written, path)
         wrote(path)
+    page = os.path.join(out, "report.html")
+    write_page(diagnosis_page(found, ", ".join(logs)), page)
+    wrote(page)
 
 
 def _causes(found) -> list[tuple[str, ...]]:

@@ -1,0 +1,35 @@
+"""How small an effect this input could still have shown."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from jaxident.diagnosis.coordinates import COORDINATES, SHAPES, from_catalogue, to_catalogue
+from jaxident.diagnosis.which import ENOUGH
+from jaxident.effects.catalogue import CATALOGUE
+
+ALL_OR_NOTHING = ("input_saturation",)
+"""Effects whose gain does not grow with their size: a level above every command does nothing at all."""
+
+
+def smallest_sizes(visible: Mapping[str, float]) -> dict[str, dict[str, float] | None]:
+    """The parameters at which each effect's gain would just be ENOUGH, {effect: {parameter: value}}, from its gain at
+    typical size: gains grow with the square of what is linear in the path, which for a limit is its inverse.
+
+    None for effects that show nothing at any size, or whose gain has no such law.
+    """
+    return {name: _smallest(name, gain) for name, gain in visible.items()}
+
+
+def _smallest(name: str, gain: float) -> dict[str, float] | None:
+    if gain <= 0.0 or name in ALL_OR_NOTHING:
+        return None
+    ratio = float(np.sqrt(ENOUGH / gain))
+    typical = from_catalogue(name, CATALOGUE[name].typical())
+    scaled = {
+        c.name: typical[c.name] if (name, c.name) in SHAPES else c.neutral + ratio * (typical[c.name] - c.neutral)
+        for c in COORDINATES[name]
+    }
+    if name == "payload_change" and not scaled["loss"] < 1.0:
+        return None  # no payload takes away more than all
+    return {key: value for key, value in to_catalogue(name, scaled).items() if (name, key) not in SHAPES}

@@ -1,0 +1,185 @@
+"""The part of a diagnosis's page that speaks of effects: which cause the gap, how far it shrinks, what stays hidden."""
+
+from collections.abc import Iterable
+
+from jaxident import plot
+from jaxident.diagnosis.coordinates import COORDINATES
+from jaxident.diagnosis.diagnose import Diagnosis
+from jaxident.diagnosis.visible import smallest_sizes
+from jaxident.diagnosis.which import ENOUGH, PENALTY, Candidate
+from jaxident.effects.catalogue import CATALOGUE
+from jaxident.report.page import Figure, Section, Table
+from jaxident.report.words import EFFECTS, chance, parameters, percent, plain, together
+
+SHOWN = 10
+"""Candidates in a picture: the best of them."""
+
+
+def causes(found: Diagnosis) -> Section:
+    """Which effects: probabilities, parameters, look-alikes, the ranking, and what none of them explains."""
+    judgement = found.judgement
+    text = (
+        f"Probability that nothing is missing: {chance(judgement.none)}; that something takes part which the catalogue "
+        f"has no name for: {chance(judgement.unknown)}."
+    )
+    table = _cause_table(found)
+    first = [text, table] if table.rows else [text, "No effect of the catalogue is likely to take part."]
+    return Section(
+        "Which effect causes it", [*first, *_look_alikes(found), RANKING, _ranking(found), *_unexplained(found)]
+    )
+
+
+RANKING = (
+    "Every effect of the catalogue was scored; the most promising were fitted in full, the nominal parameters along "
+    "with them. The gain is how much better the runs are then explained. It must pay for each number of the effect, "
+    "and for chance, before the effect is claimed: that is the black tick."
+)
+
+
+def _cause_table(found: Diagnosis) -> Table:
+    in_force = {effect.name: effect for effect in found.corrected_model.effects}
+    rows = []
+    for cause in found.judgement.causes:
+        effect = in_force.get(cause.effect)
+        size = "–" if effect is None else parameters(cause.effect, effect.parameters, effect.standard_deviation)
+        rows.append((plain(cause.effect), EFFECTS[cause.effect], chance(cause.probability), size))
+    return Table(("effect", "what it is", "probability", "size ± standard deviation"), rows,
+                 "Most probable first; sizes are those of the corrected model.")  # fmt: skip
+
+
+def _look_alikes(found: Diagnosis) -> list[str]:
+    """For each cause the effects that this input cannot tell from it."""
+    return [
+        f"This input cannot tell {plain(cause.effect)} from {together(cause.indistinguishable_from, 'or')}: any of "
+        "them may be the cause."
+        for cause in found.judgement.causes
+        if cause.indistinguishable_from
+    ]
+
+
+def _ranking(found: Diagnosis) -> Figure | str:
+    """The best candidates, sets of several effects among them, with their probabilities."""
+    finding = found.finding
+    best = sorted((c for e, c in finding.candidates.items() if e), key=lambda c: -c.evidence)[:SHOWN]
+    if not best:
+        return "No effect promised enough to be fitted."
+    sets: dict[tuple[str, ...], float] = {}
+    for effects, p in found.judgement.sets:
+        searched = tuple(sorted(name for name in effects if name in COORDINATES))
+        sets[searched] = sets.get(searched, 0.0) + p
+    best.sort(key=lambda c: -c.gain)
+    alike = {other for cause in found.judgement.causes for other in cause.indistinguishable_from}
+    names = [_label(c.effects) for c in best]
+    groups = {name: _group(c, found, alike) for name, c in zip(names, best, strict=True)}
+    notes = {n: chance(sets.get(tuple(sorted(c.effects)), 0.0)) for n, c in zip(names, best, strict=True)}
+    needed = {n: ENOUGH * len(c.effects) + c.gain - c.evidence for n, c in zip(names, best, strict=True)}
+    figure, ax = plot.figure(size=(6.3, 1.0 + _row(names) * max(len(best), 2)))
+    plot.ranking({n: c.gain for n, c in zip(names, best, strict=True)}, needed, notes=notes,
+                 groups={name: group for name, group in groups.items() if group}, ax=ax)  # fmt: skip
+    count = len(finding.candidates) - 1
+    which = f"The {SHOWN} best of {count} candidates" if count > SHOWN else "All candidates that were fitted"
+    caption = f"{which}, those that together make a set among them; behind each bar the probability of that very set."
+    return Figure(plot.image(figure), "Candidate effects by the gain that each brings", caption)
+
+
+def _row(names: Iterable[str]) -> float:
+    """Height of a picture's row [inch] under the tallest of its names."""
+    return max(0.27, 0.18 * max(name.count("\n") + 1 for name in names))
+
+
+def _label(effects: tuple[str, ...]) -> str:
+    return "\n+ ".join(plain(name) for name in effects)
+
+
+def _group(candidate: Candidate, found: Diagnosis, alike: set[str]) -> str:
+    if candidate.effects == found.finding.selected:
+        return "corrected model"
+    rest = set(candidate.effects) - set(found.finding.selected)
+    same_size = len(candidate.effects) == len(found.finding.selected)
+    return "looks alike" if rest and rest <= alike and same_size else ""
+
+
+def _unexplained(found: Diagnosis) -> list[str | Table]:
+    """What a library of forces, speeds and camera errors explains beyond the best set."""
+    terms = found.finding.terms
+    if not terms:
+        return ["Beyond these nothing systematic is left for a library of forces and camera errors to explain."]
+    rows = [(term.name, term.site, float(gain)) for term, gain in terms]
+    rest = sum(gain for _, gain in terms)
+    gained = found.finding.candidates[found.finding.selected].gain
+    text = (
+        "What the best set of effects leaves unexplained: terms from a library of simple forces and camera errors that "
+        f"would explain more, {percent(rest / max(gained + rest, 1e-9))} of all that can be explained. Commands, and "
+        "so the words small and large, are over the largest one."
+    )
+    return [text, Table(("term", "site", "gain"), rows, "They are no effects by name; they say where to look.")]
+
+
+def shrink(found: Diagnosis) -> Section:
+    """How far each effect makes the gap shrink, with the placebo."""
+    gap = found.gap
+    rows: dict[str, tuple[float, tuple[float, float], str]] = {}
+    chosen = _label(found.finding.selected)
+    if chosen and gap.shrink.value is not None and gap.shrink.interval is not None:
+        rows[chosen] = gap.shrink.value, gap.shrink.interval, "corrected model"
+    weak = gap.placebo[0] if gap.placebo else ""
+    for name, one in sorted(found.shrinks.items(), key=lambda pair: (pair[0] == weak, -(pair[1].value or 0.0))):
+        if one.value is not None and one.interval is not None and plain(name) not in rows:
+            rows[plain(name)] = one.value, one.interval, "placebo" if name == weak else "other effects, alone"
+    if not rows:
+        return Section("How far the gap shrinks", [NOTHING_TO_SHRINK])
+    figure, ax = plot.figure(size=(6.3, 1.0 + _row(rows) * max(len(rows), 2)))
+    plot.shrinks({n: row[0] for n, row in rows.items()}, {n: row[1] for n, row in rows.items()},
+                 groups={n: row[2] for n, row in rows.items()}, ax=ax)  # fmt: skip
+    return Section("How far the gap shrinks", [SHRINK, Figure(plot.image(figure), "Shrink of the gap by effect")])
+
+
+NOTHING_TO_SHRINK = (
+    "With its parameters refitted, the nominal model's error does not stand out from noise: no gap is left to shrink."
+)
+SHRINK = (
+    "0 % leaves the gap as it is after the nominal parameters are refitted, 100 % brings it down to the floor; beyond, "
+    "the error came out below the floor. All on stretches that took no part in finding the effect. The placebo is the "
+    "effect that least speaks for: its interval should hold 0 %, or the numbers above it are worth less."
+)
+
+
+def hidden(found: Diagnosis) -> Section:
+    """What this input could have shown: the gain of each effect at typical size, and the smallest it shows."""
+    smallest = smallest_sizes(found.visible)
+    rows = []
+    for name, gain in sorted(found.visible.items(), key=lambda pair: pair[1]):
+        size, typical = smallest[name], CATALOGUE[name].typical()
+        shown = {key: typical[key] for key in (size or typical)}
+        least = "–" if size is None else parameters(name, size)
+        rows.append(
+            (plain(name), parameters(name, shown), float(f"{gain:.3g}"), "yes" if gain >= ENOUGH else "no", least)
+        )
+    missed = found.not_testable
+    lead = (
+        f"This input could not have shown {together(missed, 'or')} at its typical size: nothing here speaks against it."
+        if missed else "This input would have shown every effect that shapes the path, at its typical size."
+    )  # fmt: skip
+    table = Table(("effect", "typical size", "gain", "visible", "smallest visible"), rows, HIDDEN_CAPTION)
+    return Section("What this input could have shown", [lead, table, DIRECT])
+
+
+HIDDEN_CAPTION = (
+    f"Gain at the typical size, nominal parameters refitted; visible from {ENOUGH:g} on, to which the smallest size is "
+    f"scaled. A claim asks for {PENALTY:g} more for each number of the effect."
+)
+DIRECT = (
+    "Frozen frames, outliers and camera errors that persist are looked for in the frames themselves and in the noise; "
+    "they need no special input."
+)
+
+
+def in_words(found: Diagnosis) -> str:
+    """The selected effects with what they are and their parameters, for a sentence."""
+    in_force = {effect.name: effect for effect in found.corrected_model.effects}
+    parts = []
+    for name in found.selected:
+        effect = in_force.get(name)
+        size = "" if effect is None else f"; {parameters(name, effect.parameters, effect.standard_deviation)}"
+        parts.append(f"{plain(name)} ({EFFECTS[name]}{size})")
+    return f"{', '.join(parts[:-1])} and {parts[-1]}" if len(parts) > 1 else "".join(parts)

@@ -1,0 +1,225 @@
+"""The page of `jaxident diagnose`: how large the gap is, where it lies, what causes it, how far it shrinks."""
+
+from importlib.metadata import version
+
+import numpy as np
+
+from jaxident import plot
+from jaxident.diagnosis.diagnose import DIFFERENT, Diagnosis, Parameter
+from jaxident.diagnosis.gap import interval
+from jaxident.diagnosis.gap import CHANNELS
+from jaxident.report import causes, words
+from jaxident.report.page import Figure, Page, Section, Table
+from jaxident.report.words import NOMINAL, SITES, SPACE, VARIABLES, chance, measured, number, percent, plain, together
+
+COUNTS = {2: "two", 3: "three", 4: "four"}
+LISTED = 12
+"""Regions that the table shows."""
+
+
+def diagnosis_page(found: Diagnosis, name: str) -> Page:
+    """The page of one diagnosis; `name` says of what, such as the logs' folder."""
+    sections = [
+        _gap(found),
+        _where(found),
+        causes.causes(found),
+        causes.shrink(found),
+        _parameters(found),
+        causes.hidden(found),
+        Section("What to do next", [found.next]),
+    ]
+    return Page(f"Diagnosis of {name}", lead(found), sections, f"jaxident {version('jaxident')}")
+
+
+def lead(found: Diagnosis) -> str:
+    """The verdict in a sentence or two."""
+    gap = found.gap
+    low, high = gap.floor_interval
+    if found.verdict == "no_gap":
+        return (
+            f"No gap: the model predicts these logs {gap.horizon:.3g} s ahead as well as noise allows, with an error "
+            f"of {number(gap.before)} camera variances where noise alone makes {number(low)} to {number(high)}."
+        )
+    if found.verdict == "parameters":
+        return (
+            f"The model has the right form but not the right parameters: {_moved(found)}. Refitting them takes the "
+            f"error from {number(gap.before)} to {number(gap.refitted)} camera variances; noise alone makes "
+            f"{number(low)} to {number(high)}."
+        )
+    if found.verdict == "effects":
+        count = (
+            "one unmodelled effect"
+            if len(found.selected) == 1
+            else f"{COUNTS.get(len(found.selected), 'several')} unmodelled effects"
+        )
+        return f"The gap comes from {count}: {causes.in_words(found)}. {_shrinks(found)}{_doubt(found)}"
+    if found.verdict == "unknown":
+        return f"There is a gap that no effect of the catalogue explains{_place(found)}. {_best_try(found)}"
+    return f"These logs do not suffice for a verdict. {found.next}"
+
+
+def _moved(found: Diagnosis) -> str:
+    moved = [p for p in found.parameters if p.nominal is not None and _deviations(p) > DIFFERENT]
+    told = sorted(moved, key=_deviations, reverse=True)[:3]
+    parts = (f"{p.name} is {number(p.refitted)}, not {number(p.nominal)}" for p in told)
+    more = f" and {len(moved) - len(told)} more differ" if len(moved) > len(told) else ""
+    return f"{'; '.join(parts)}{more}"
+
+
+def _deviations(parameter: Parameter) -> float:
+    """Standard deviations between a parameter as given and as refitted."""
+    if parameter.nominal is None:
+        return 0.0
+    return abs(parameter.refitted - parameter.nominal) / max(parameter.standard_deviation, 1e-12)
+
+
+def _shrinks(found: Diagnosis) -> str:
+    shrink = found.gap.shrink
+    if not found.finding.selected:
+        return "It shows in the camera's poses and leaves the path alone, so that no shrink is told."
+    if shrink.value is None or shrink.interval is None:
+        return "On the runs kept for judging, the gap does not stand out from noise, so that no shrink can be told."
+    it = "it" if len(found.selected) == 1 else "them"
+    low, high = map(percent, shrink.interval)
+    return f"With {it} in the model the gap shrinks by {percent(shrink.value)} (90{SPACE}% interval {low} to {high})."
+
+
+def _doubt(found: Diagnosis) -> str:
+    """Which selected effects could be others."""
+    doubtful = [c for c in found.judgement.causes if c.indistinguishable_from and c.effect in found.selected]
+    told = (
+        f" This input cannot tell {plain(c.effect)} from {together(c.indistinguishable_from, 'or')}." for c in doubtful
+    )
+    return "".join(told)
+
+
+def _place(found: Diagnosis) -> str:
+    """The largest channel and the most probable site."""
+    channel, share = max(found.where.channels.items(), key=lambda pair: pair[1])
+    site, likely = max(found.judgement.sites.items(), key=lambda pair: pair[1])
+    seen = f"{percent(share)} of it shows {words.CHANNELS[channel]}" if share > 0.0 else ""
+    looks = f"it looks like something {SITES[site]}" if likely > 0.0 and site != "time" else ""
+    looks = "it looks like something that changes during the session" if likely > 0.0 and site == "time" else looks
+    told = ", and ".join(part for part in (seen, looks) if part)
+    return f"; {told}" if told else ""
+
+
+def _best_try(found: Diagnosis) -> str:
+    shrink, best = found.gap.shrink, found.finding.selected
+    if not best or shrink.value is None:
+        return "No set of known effects makes it smaller."
+    return f"The best known set, {together(best)}, shrinks it by {percent(shrink.value)} and leaves the rest."
+
+
+def _gap(found: Diagnosis) -> Section:
+    """The errors of the models before and after, of all channels and of each, against the floor."""
+    gap = found.gap
+    levels, intervals = {}, {}
+    for label, errors in zip(_models(found), np.asarray(gap.errors), strict=True):
+        kept = errors[np.isfinite(errors).all(axis=1)]
+        if label and len(kept):
+            channels = [kept, *(kept[:, [k]] for k in range(len(CHANNELS)))]
+            levels[label] = [float(np.mean(part)) for part in channels]
+            intervals[label] = [interval(part) for part in channels]
+    if not levels:
+        return Section("How large the gap is", ["No stretch of the logs is left to judge by."])
+    floor = [gap.floor, *np.asarray(gap.replay.channels).mean(axis=0).tolist()]
+    rows = ("all channels", *CHANNELS)
+    figure, ax = plot.figure(size=(6.3, 2.9))
+    plot.gap_levels(levels, floor, rows=rows, intervals=intervals, floor_interval=gap.floor_interval, ax=ax)
+    picture = Figure(plot.image(figure), "Error of each model by channel, against the floor", GAP_CAPTION)
+    cells = [
+        (name, *(float(f"{value:.3g}") for value in values)) for name, values in (levels | {"floor": floor}).items()
+    ]
+    with_effects = f" The corrected model has {together(selected)}." if (selected := found.finding.selected) else ""
+    table = Table(("model", *rows), cells, f"Mean squared errors in camera variances.{with_effects}")
+    return Section("How large the gap is", [GAP.format(horizon=gap.horizon), picture, table])
+
+
+def _models(found: Diagnosis) -> tuple[str, str, str]:
+    """Names of the models before, refitted and after; empty where one is the same as another."""
+    given = any(p.nominal is not None for p in found.parameters)
+    after = "corrected model" if found.finding.selected else ""
+    return "as given" if given else "", "parameters refitted" if given else "nominal model", after
+
+
+GAP = (
+    "From the first poses of each stretch of a run the model predicts {horizon:.3g} s ahead. The error is measured in "
+    "units of the camera's own variance: 1 is an error as large as the camera's. Along is in the direction of travel, "
+    "lateral sideways. Only stretches that took no part in any fit count."
+)
+GAP_CAPTION = (
+    f"Points: mean with 90{SPACE}% interval. Black bars: the floor, what noise alone would leave; grey: its "
+    f"90{SPACE}% interval. A gap is what lies above."
+)
+
+
+def _where(found: Diagnosis) -> Section:
+    """Channels, the map, the regions that stand out, and the sites."""
+    place, largest, channels = found.where, found.prepared.largest, words.CHANNELS
+    if any(share > 0.0 for share in place.channels.values()):
+        shares = ", ".join(f"{percent(share)} is {channels[name]}" for name, share in place.channels.items())
+        text = f"Of the nominal model's error beyond the floor, parameters refitted, {shares}."
+    else:
+        text = "The nominal model's error does not lie above the floor in any channel."
+    blocks: list = [text]
+    if place.table and any(share > 0.0 for share in place.channels.values()):
+        blocks += [MAP, _map(found)]
+    rows = [
+        (_variable(region.variable), *(_scaled(end, region.variable, largest) for end in (region.low, region.high)),
+         percent(region.share), f"{region.p_value:.2g}")
+        for region in place.regions[:LISTED]
+    ]  # fmt: skip
+    more = f" The first {LISTED} of {len(place.regions)}." if len(place.regions) > LISTED else ""
+    table = Table(("variable", "from", "to", "share of excess", "probability by chance"), rows,
+                  f"Regions that stand out from the rest; five in a hundred may be false.{more}")  # fmt: skip
+    blocks.append(table if rows else "No region stands out from the rest.")
+    sites = [(site, SITES[site], chance(p)) for site, p in found.judgement.sites.items()]
+    blocks.append(Table(("site", "what it is", "takes part"), sites, "Where in the robot the cause lies."))
+    return Section("Where it lies", blocks)
+
+
+MAP = (
+    "The map: each row sorts the stretches by one thing that the robot did, into bins equally full. Bright bins are "
+    "where the nominal model errs beyond the floor; framed ones stand out more than chance allows."
+)
+
+
+def _map(found: Diagnosis) -> Figure:
+    table, marked, largest = {}, set(), found.prepared.largest
+    standing = {(region.variable, region.low) for region in found.where.regions}
+    for variable, (edges, means) in found.where.table.items():
+        label = _variable(variable)
+        table[label] = [_scaled(edge, variable, largest) for edge in edges], means
+        marked |= {(label, k) for k, edge in enumerate(edges[:-1]) if (variable, float(edge)) in standing}
+    figure, ax = plot.figure(size=(6.3, 0.9 + 0.27 * len(table)))
+    plot.gap_map(table, marked=marked, label="mean squared error beyond the floor [camera variances]", ax=ax)
+    return Figure(plot.image(figure), "Mean excess error by what the robot was doing")
+
+
+def _variable(name: str) -> str:
+    meaning, unit, _ = VARIABLES.get(name, (name, "", 0))
+    return f"{meaning} [{unit}]" if unit else meaning
+
+
+def _scaled(value: float, name: str, largest: float) -> float:
+    """A bin's edge in the user's unit; the diagnosis has commands over their largest."""
+    return float(value) * largest ** VARIABLES.get(name, ("", "", 0))[2]
+
+
+def _parameters(found: Diagnosis) -> Section:
+    """The nominal parameters as given and as refitted."""
+    given = any(p.nominal is not None for p in found.parameters)
+    rows = []
+    for p in found.parameters:
+        meaning, unit = NOMINAL.get(p.name, ("", ""))
+        value = measured(p.refitted, p.standard_deviation)
+        apart = (number(p.nominal), value, float(f"{_deviations(p):.2g}")) if given else (value,)
+        rows.append((p.name, meaning, unit, *apart))
+    middle = ("given", "refitted", "apart [sd]") if given else ("identified",)
+    notes = ["± is a standard deviation (sd)."]
+    if found.finding.selected:
+        notes.append(f"Fitted together with {together(found.finding.selected)}.")
+    if given:
+        notes.append(f"From {DIFFERENT:g} sd on, given and refitted differ.")
+    return Section("Parameters", [Table(("parameter", "what it is", "unit", *middle), rows, " ".join(notes))])

@@ -1,0 +1,146 @@
+"""What a diagnosis speaks of, in words for people who never saw the package."""
+
+from collections.abc import Iterable, Mapping
+from math import floor, isfinite, log10
+
+from jaxident.effects.catalogue import CATALOGUE
+from jaxident.effects.entry import UNIT, Parameter
+from jaxident.report.page import NOTHING
+
+SPACE = "\N{NO-BREAK SPACE}"
+
+EFFECTS = {
+    "asymmetric_dead_zone": "a wheel's dead zone is wider in one direction than in the other",
+    "direction_gain": "a wheel turns faster in one direction than in the other",
+    "input_saturation": "commands beyond a level have no further effect",
+    "input_quantisation": "commands act in steps",
+    "input_rate_limit": "commands can change only so fast",
+    "transport_delay": "commands act late, or the camera reports late",
+    "motor_lag": "the motors take time to follow",
+    "backlash": "play in the gears, lost at each reversal",
+    "supply_sag": "the supply gives way when both motors draw",
+    "lost_commands": "some commands never arrive",
+    "coulomb_friction": "dry friction, the same at any speed",
+    "stiction": "it takes more to leave rest than to keep moving",
+    "quadratic_drag": "drag that grows with the square of the speed",
+    "mass_offset": "the centre of mass lies off the axle",
+    "turn_loss": "speed is lost while turning",
+    "traction_limit": "the wheels' grip on the floor is limited",
+    "lateral_slip": "the robot drifts outwards in curves",
+    "slope": "the floor is not level",
+    "gain_drift": "the drive grows weaker or stronger with time, as when a battery runs down",
+    "dead_zone_drift": "the dead zones change with time, as by wear",
+    "payload_change": "the load changed at some instant",
+    "marker_offset": "the tracked marker is not on the axle's centre",
+    "heading_offset": "the reported heading is off by a constant",
+    "camera_scale": "the camera scales x and y differently",
+    "lens_distortion": "the camera's lens bends the picture",
+    "coloured_noise": "the camera's errors persist from frame to frame",
+    "outliers": "single poses are far off",
+    "frozen_frames": "the camera repeats old poses",
+    "camera_tilt": "the camera looks at the floor aslant",
+}
+"""Each effect of the catalogue in plain words."""
+
+SITES = {
+    "actuation": "from the command to the motor",
+    "drive": "motors, friction and inertia",
+    "contact": "between wheels and floor",
+    "time": "changes during the session",
+    "camera": "the measurement of the pose",
+}
+
+CHANNELS = {"along": "in the direction of travel", "lateral": "sideways", "heading": "in heading"}
+
+VARIABLES = {
+    "u_r": ("right command", UNIT, 1),
+    "u_l": ("left command", UNIT, 1),
+    "|u|": ("mean size of commands", UNIT, 1),
+    "largest |u|": ("largest command", UNIT, 1),
+    "v": ("speed", "m/s", 0),
+    "w": ("turn rate", "rad/s", 0),
+    "|v|": ("size of the speed", "m/s", 0),
+    "|w|": ("size of the turn rate", "rad/s", 0),
+    "v w": ("speed times turn rate", "m rad/s²", 0),
+    "w^2": ("turn rate squared", "rad²/s²", 0),
+    "reversals": ("changes of a command's sign", "", 0),
+    "rest": ("share of commands near zero", "", 0),
+    "heading": ("heading", "rad", 0),
+    "x": ("position x", "m", 0),
+    "y": ("position y", "m", 0),
+    "session time": ("session time", "s", 0),
+}
+"""Variables of the map: in words, unit, and the power of the largest command that brings them to the user's unit."""
+
+NOMINAL = {
+    "rate_1": ("how fast the speed settles", "1/s"),
+    "rate_2": ("how fast the turn rate settles", "1/s"),
+    "gain_11": ("right motor to forward acceleration", f"m/s²/{UNIT}"),
+    "gain_12": ("left motor to forward acceleration", f"m/s²/{UNIT}"),
+    "gain_21": ("right motor to turning acceleration", f"rad/s²/{UNIT}"),
+    "gain_22": ("left motor to turning acceleration", f"rad/s²/{UNIT}"),
+    "dead_zone_r": ("dead zone of the right wheel", UNIT),
+    "dead_zone_l": ("dead zone of the left wheel", UNIT),
+    "coupling_1": ("turn rate to forward acceleration", "m/s²/(rad/s)"),
+    "coupling_2": ("speed to turning acceleration", "rad/s²/(m/s)"),
+}
+"""The nominal parameters: in words, and their unit."""
+
+
+def plain(name: str) -> str:
+    """An effect's name as words; a name that is none of the catalogue's stands as it is."""
+    return name.replace("_", " ")
+
+
+def together(names: Iterable[str], word: str = "and") -> str:
+    """Names of effects in a row: a, b and c."""
+    *most, last = [plain(name) for name in names] or [""]
+    return f"{', '.join(most)} {word} {last}" if most else last
+
+
+def number(value: float | None) -> str:
+    """A number with three digits, whole ones in full."""
+    if value is None or not isfinite(value):
+        return NOTHING
+    return f"{value:{'.0f' if 1e3 <= abs(value) < 1e6 else '.3g'}}".replace("-", "\N{MINUS SIGN}")
+
+
+def measured(value: float, deviation: float | None, unit: str = "") -> str:
+    """A value ± its standard deviation of two digits, with unit."""
+    behind = f"{SPACE}{unit}" if unit else ""
+    if deviation is None or not isfinite(deviation) or deviation <= 0.0:
+        return f"{number(value)}{behind}"
+    digits = 1 - floor(log10(deviation))
+    if digits > 6 or digits < 0:
+        return f"{number(value)}{SPACE}±{SPACE}{number(deviation)}{behind}"
+    return f"{value:.{digits}f}{SPACE}±{SPACE}{deviation:.{digits}f}{behind}".replace("-", "\N{MINUS SIGN}")
+
+
+def parameters(name: str, values: Mapping[str, float], deviations: Mapping[str, float] | None = None) -> str:
+    """The parameters of an effect with units: "right 0.052 ± 0.003 unit, left 0.048 ± 0.004 unit"."""
+    known = {parameter.name: parameter for parameter in CATALOGUE[name].parameters}
+    return ", ".join(
+        f"{plain(k)} {_parameter(known[k], float(v), (deviations or {}).get(k))}" for k, v in values.items()
+    )
+
+
+def _parameter(parameter: Parameter, value: float, deviation: float | None) -> str:
+    apart = value - parameter.neutral
+    if deviation is None and isfinite(apart) and parameter.neutral and 0.0 < abs(apart) < 0.1:
+        digits = 1 - floor(log10(abs(apart)))
+        return f"{value:.{digits}f}"  # a ratio of 1.002 is not 1
+    return measured(value, deviation, parameter.unit.replace("^2", "²"))
+
+
+def percent(share: float | None) -> str:
+    """A share in whole per cent."""
+    if share is None or not isfinite(share):
+        return NOTHING
+    return f"{round(100.0 * share)}{SPACE}%".replace("-", "\N{MINUS SIGN}")
+
+
+def chance(probability: float) -> str:
+    """A probability in whole per cent, never quite none nor all."""
+    if 0.0 < probability < 0.005:
+        return f"< 1{SPACE}%"
+    return f"> 99{SPACE}%" if 0.995 < probability < 1.0 - 1e-9 else percent(probability)

@@ -1,0 +1,131 @@
+"""The page of a diagnosis, of one made up for each verdict."""
+
+import numpy as np
+import pytest
+from support.diagnoses import LARGEST, VERDICTS, made_up
+
+from jaxident.diagnosis.visible import smallest_sizes
+from jaxident.effects.catalogue import CATALOGUE
+from jaxident.report import Figure, Table, render
+from jaxident.report.diagnosis import diagnosis_page, lead
+from jaxident.report.words import EFFECTS, SITES, chance, measured, number, parameters, percent, together
+
+LEADS = {
+    "no_gap": "No gap: the model predicts these logs 1 s ahead as well as noise allows",
+    "parameters": "The model has the right form but not the right parameters: coupling_2 is 2.9, not 2;",
+    "effects": "The gap comes from two unmodelled effects: transport delay (commands act late",
+    "unknown": "There is a gap that no effect of the catalogue explains; 55 % of it shows in the direction of travel",
+    "undecided": "These logs do not suffice for a verdict. Record a longer <run> & more.",
+}
+
+
+def plain_spaces(text: str) -> str:
+    return text.replace("\N{NO-BREAK SPACE}", " ")
+
+
+def section(page, heading: str):
+    return next(part for part in page.sections if part.heading == heading)
+
+
+def tables(part) -> list[Table]:
+    return [block for block in part.blocks if isinstance(block, Table)]
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_every_verdict_has_a_page(verdict):
+    page = diagnosis_page(made_up(verdict), "<runs>")
+    assert plain_spaces(page.lead).startswith(LEADS[verdict])
+    html = render(page)
+    assert "<runs>" not in html
+    assert "<run>" not in html
+    assert "Record a longer &lt;run&gt; &amp; more." in html
+    assert page.footer.startswith("jaxident ")
+    assert any(isinstance(block, Figure) for block in page.sections[0].blocks)
+
+
+def test_lead_tells_sizes_shrink_and_look_alikes():
+    told = plain_spaces(lead(made_up("effects")))
+    assert "delay 0.0521 ± 0.0034 s" in told
+    assert "the gap shrinks by 99 % (90 % interval 96 % to 101 %)" in told
+    assert told.endswith("This input cannot tell transport delay from motor lag.")
+
+
+def test_effects_of_the_camera_alone_tell_no_shrink():
+    found = made_up("no_gap")._replace(verdict="effects", selected=("frozen_frames",))
+    assert "frozen frames (the camera repeats old poses)" in lead(found)
+    assert lead(found).endswith("no shrink is told.")
+
+
+def test_regions_are_in_the_users_unit():
+    (regions, sites) = tables(section(diagnosis_page(made_up("effects"), "runs"), "Where it lies"))
+    assert regions.rows[0][:3] == ("right command [unit]", 0.5 * LARGEST, 1.0 * LARGEST)
+    assert regions.rows[1][:3] == ("size of the speed [m/s]", 0.3, 0.9)
+    assert [row[0] for row in sites.rows] == list(SITES)
+
+
+def test_models_that_were_not_given_are_not_shown():
+    (alone,) = tables(section(diagnosis_page(made_up("effects"), "runs"), "How large the gap is"))
+    (beside,) = tables(section(diagnosis_page(made_up("effects", given=True), "runs"), "How large the gap is"))
+    assert [row[0] for row in alone.rows] == ["nominal model", "corrected model", "floor"]
+    assert [row[0] for row in beside.rows] == ["as given", "parameters refitted", "corrected model", "floor"]
+
+
+def test_nothing_seen_is_a_page_too():
+    found = made_up("undecided", given=True)
+    nothing = np.full((3, 4, 3), np.nan)
+    replay = found.gap.replay._replace(channels=nothing[0])
+    gap = found.gap._replace(errors=nothing, floor=np.nan, floor_interval=(np.nan, np.nan), replay=replay)
+    finding = found.finding._replace(candidates={(): found.finding.candidates[()]})
+    page = diagnosis_page(found._replace(gap=gap, finding=finding, shrinks={}), "runs")
+    assert section(page, "How large the gap is").blocks == ["No stretch of the logs is left to judge by."]
+    assert "No effect promised enough to be fitted." in section(page, "Which effect causes it").blocks
+
+
+def test_what_stays_unexplained_is_told():
+    (_, rest) = tables(section(diagnosis_page(made_up("unknown"), "runs"), "Which effect causes it"))
+    assert rest.rows == [("|v| w in the speed sideways", "contact", 150.0)]
+
+
+def test_no_gap_has_no_map_and_nothing_to_shrink():
+    page = diagnosis_page(made_up("no_gap"), "runs")
+    parts = section(page, "Where it lies"), section(page, "How far the gap shrinks")
+    assert not any(isinstance(block, Figure) for part in parts for block in part.blocks)
+
+
+def test_hidden_effects_come_first_with_the_smallest_visible_size():
+    part = section(diagnosis_page(made_up("no_gap"), "runs"), "What this input could have shown")
+    (table,) = tables(part)
+    assert plain_spaces(table.rows[0][0]) == "camera tilt"
+    assert [row[3] for row in table.rows] == sorted(row[3] for row in table.rows)
+    assert "camera tilt" in part.blocks[0]
+
+
+def test_smallest_sizes_follow_the_square_of_the_gain():
+    gains = {"transport_delay": 900.0, "input_rate_limit": 36.0, "traction_limit": 9.0 * 16.0, "payload_change": 900.0}
+    found = smallest_sizes(gains | {"input_saturation": 50.0, "slope": 0.0, "stiction": 36.0})
+    typical = {name: CATALOGUE[name].typical() for name in found}
+    assert found["transport_delay"] == pytest.approx({"delay": typical["transport_delay"]["delay"] / 10.0})
+    assert found["input_rate_limit"] == pytest.approx({"rate": 2.0 * typical["input_rate_limit"]["rate"]})
+    assert found["traction_limit"] == pytest.approx({"limit": 2.0 * typical["traction_limit"]["limit"]})
+    assert found["payload_change"] == pytest.approx({"ratio": 1.0 / (1.0 - (1.0 - 1.0 / 1.5) / 10.0)})
+    assert found["input_saturation"] is None
+    assert found["slope"] is None
+    assert set(found["stiction"]) == {"right", "left"}
+
+
+def test_words():
+    assert EFFECTS.keys() == CATALOGUE.keys()
+    assert [number(value) for value in (None, float("nan"), 1.1, -0.01234, 31122.0)] == [
+        "–", "–", "1.1", "−0.0123", "31122"]  # fmt: skip
+    assert plain_spaces(measured(27.1891, 0.0338, "m")) == "27.189 ± 0.034 m"
+    assert plain_spaces(measured(-7e-5, 1.4e-4)) == "−0.00007 ± 0.00014"
+    assert parameters("payload_change", {"ratio": 1.00388}) == "ratio 1.0039"
+    assert [plain_spaces(chance(p)) for p in (0.0, 0.001, 0.5, 0.999, 1.0)] == [
+        "0 %",
+        "< 1 %",
+        "50 %",
+        "> 99 %",
+        "100 %",
+    ]
+    assert plain_spaces(percent(-0.3)) == "−30 %"
+    assert together(["motor_lag", "slope", "backlash"], "or") == "motor lag, slope or backlash"

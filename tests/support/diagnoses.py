@@ -1,0 +1,108 @@
+"""A diagnosis made up by hand for each verdict: what pages and files are tried with, at no cost."""
+
+from typing import Any
+
+import numpy as np
+
+from jaxident.diagnosis.coordinates import COORDINATES, NOMINAL
+from jaxident.diagnosis.corrector import Term
+from jaxident.diagnosis.diagnose import Diagnosis, Gap, Parameter
+from jaxident.diagnosis.gap import Floor, Shrink
+from jaxident.diagnosis.noise import Law
+from jaxident.diagnosis.prepare import Frames, Prepared
+from jaxident.diagnosis.verdict import Cause, Judgement
+from jaxident.diagnosis.where import Place, Region
+from jaxident.diagnosis.which import Candidate, Finding
+from jaxident.effects.catalogue import SITES
+from jaxident.robot.drive import Physical
+from jaxident.robot.model import Effect, Model
+
+VERDICTS = ("no_gap", "parameters", "effects", "unknown", "undecided")
+LARGEST = 2.0
+_LAW = Law(1e-3, 5e-3)
+_NOTHING: Any = None
+"""Stands for parts of a search that no page shows."""
+
+
+def made_up(verdict: str, *, given: bool = False) -> Diagnosis:
+    """A diagnosis of 30 windows with some verdict; `given`: of a nominal model that the user gave."""
+    effects, gap = verdict == "effects", verdict in ("effects", "unknown")
+    given = given or verdict == "parameters"
+    selected = ("transport_delay", "quadratic_drag") if effects else ("marker_offset",) if verdict == "unknown" else ()
+    after = {"effects": 1.2, "unknown": 25.0}.get(verdict, 1.1)
+    levels = (60.0 if given else 40.0) if gap or given else 1.1, 40.0 if gap else 1.1, after
+    shrinks = {name: Shrink(*_shrink(value, gap)) for name, value in SHRINKS.items()}
+    shrink = Shrink(*_shrink(1.0 - (after - 1.0) / 39.0, gap))
+    errors = np.stack([level * np.random.default_rng(4).chisquare(3, (30, 3)) / 3.0 for level in levels])
+    errors = errors * (np.array([1.5, 0.3, 1.2]) if gap else 1.0)
+    replay = Floor(1.05, np.linspace(0.8, 1.3, 400), np.full((30, 3), 1.05))
+    placebo = ("camera_scale", shrinks["camera_scale"])
+    model = Model(0.05, Physical(np.array([2.0, 3.0]), np.ones((2, 2)), np.zeros(2)), np.array([0.1, 0.1]))
+    return Diagnosis(
+        verdict, _judgement(verdict, selected),
+        Gap(1.0, *levels, 1.05, (0.8, 1.3), shrink, placebo, errors, replay), _place(gap),
+        selected if effects else (),
+        [Parameter(n, 2.0 if given else None, 2.0 + 0.1 * k, 0.06) for k, n in enumerate(NOMINAL)],
+        {name: 1.7**k / 10.0 for k, name in enumerate(reversed(COORDINATES))}, "Record a longer <run> & more.",
+        model, _with_effects(model, selected), shrinks, Prepared(_NOTHING, LARGEST, _NOTHING, _NOTHING, 1.0,
+        Frames(_NOTHING, _NOTHING), _NOTHING, _LAW), _finding(selected, gap, verdict),
+    )  # fmt: skip
+
+
+SHRINKS = {
+    "transport_delay": 0.8,
+    "motor_lag": 0.75,
+    "quadratic_drag": 0.3,
+    "marker_offset": 0.39,
+    "camera_scale": 0.01,
+}
+
+
+def _shrink(value: float, stands_out: bool) -> tuple[Any, Any]:
+    return (value, (value - 0.03, value + 0.02)) if stands_out else (None, None)
+
+
+def _with_effects(model: Model, selected: tuple[str, ...]) -> Model:
+    known = {
+        "transport_delay": Effect("transport_delay", {"delay": 0.0521}, {"delay": 0.0034}),
+        "quadratic_drag": Effect("quadratic_drag", {"along": 0.51, "heading": 0.3}, {"along": 0.02, "heading": 0.05}),
+        "marker_offset": Effect("marker_offset", {"ahead": 0.02, "left": -0.01}, {"ahead": 0.001, "left": 0.002}),
+    }
+    return Model(model.sample_period, model.dynamics, model.dead_zone, effects=tuple(known[n] for n in selected))
+
+
+def _judgement(verdict: str, selected: tuple[str, ...]) -> Judgement:
+    if verdict == "effects":
+        causes = [Cause("transport_delay", "actuation", 0.99, ("motor_lag",), False),
+                  Cause("quadratic_drag", "drive", 0.9, (), False),
+                  Cause("motor_lag", "actuation", 0.01, (), False)]  # fmt: skip
+        sets = [(tuple(sorted(selected)), 0.9), (("transport_delay",), 0.09), (("motor_lag", "quadratic_drag"), 0.01)]
+        return Judgement(0.0, 0.0, sets, causes, dict(zip(SITES, (1.0, 0.9, 0.0, 0.0, 0.0), strict=True)))
+    if verdict == "unknown":
+        causes = [Cause("marker_offset", "camera", 0.05, (), False)]
+        sites = dict(zip(SITES, (0.1, 0.0, 0.8, 0.0, 0.15), strict=True))
+        return Judgement(0.0, 0.95, [(("marker_offset",), 0.05)], causes, sites)
+    return Judgement(0.97, 0.01, [(("camera_scale",), 0.02)], [], dict.fromkeys(SITES, 0.0))
+
+
+def _place(gap: bool) -> Place:
+    edges = {"u_r": np.linspace(-1.0, 1.0, 5), "|v|": np.array([0.0, 0.1, 0.25, 0.3, 0.9]),
+             "reversals": np.array([0.0, 1.0, 4.0]), "session time": np.linspace(0.0, 120.0, 5)}  # fmt: skip
+    size = 40.0 if gap else 0.1
+    table = {n: (e, size * np.linspace(-0.1, 1.0 + 0.1 * k, len(e) - 1) ** 3) for k, (n, e) in enumerate(edges.items())}
+    regions = [Region("u_r", 0.5, 1.0, 0.6, 0.001), Region("|v|", 0.3, 0.9, 0.4, 0.01)] if gap else []
+    channels = dict(zip(("along", "lateral", "heading"), (0.55, 0.05, 0.4) if gap else (0.0, 0.0, 0.0), strict=True))
+    return Place(channels, regions, table)
+
+
+def _finding(selected: tuple[str, ...], gap: bool, verdict: str) -> Finding:
+    size = 400.0 if gap else 3.0
+    gains: dict[tuple[str, ...], float] = {(): 0.0}
+    gains |= {(name,): size * max(value, 0.01) for name, value in SHRINKS.items()}
+    if len(selected) == 2:
+        gains[selected] = 1.2 * size
+        gains["motor_lag", "quadratic_drag"] = 1.19 * size
+        gains["transport_delay", "marker_offset"] = 0.82 * size
+    candidates = {effects: Candidate(effects, _NOTHING, gain) for effects, gain in gains.items()}
+    terms: list[tuple[Any, float]] = [(Term("contact", "|v| w in the speed sideways"), 150.0)] * (verdict == "unknown")
+    return Finding(_NOTHING, _LAW, _NOTHING, _NOTHING, candidates, selected, terms, {})
