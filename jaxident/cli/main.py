@@ -15,6 +15,7 @@ COMMANDS = {
     "convert": "Two streams, commands and poses, to one log.",
     "identify": "The model behind one or several logs.",
     "predict": "Free-run prediction of a log by a model.",
+    "plan": "The next input: the one that best separates two effects.",
     "sweep": "A Monte-Carlo study: statistics over seeds, excitations, noise levels, robots, estimators.",
     "bench": "How fast the pipeline is on this machine.",
 }

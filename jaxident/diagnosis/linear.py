@@ -86,15 +86,15 @@ def gram(whitener: Array, columns: Array, starts: Array) -> Gram:
 
 def explained(products: Array, base: list[int], more: list[int]) -> float:
     """Fall of -log p when columns `more` join columns `base` in the fit of the last one; products (n, n)."""
-    return _left(products, base) - _left(products, [*base, *more])
+    return left_over(products, base) - left_over(products, [*base, *more])
 
 
-def _left(products: Array, columns: list[int]) -> float:
+def left_over(products: Array, columns: list[int]) -> float:
     """Half the squares that a fit of the last column by some others leaves."""
     last = len(products) - 1
     if not columns:
         return 0.5 * float(products[last, last])
-    own, cross, scale = normal(products, columns)
+    own, cross, _ = normal(products, columns)
     return 0.5 * float(products[last, last] - cross @ np.linalg.solve(own, cross))
 
 
@@ -105,4 +105,4 @@ def normal(products: Array, columns: list[int], ridge: float = 1e-10) -> tuple[n
     return own / scale[:, None] / scale + ridge * np.eye(len(columns)), products[columns, -1] / scale, scale
 
 
-__all__ = ["SIZE", "Gram", "Linear", "explained", "follow", "gram", "linearise", "normal"]
+__all__ = ["SIZE", "Gram", "Linear", "explained", "follow", "gram", "left_over", "linearise", "normal"]
