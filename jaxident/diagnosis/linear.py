@@ -86,10 +86,10 @@ def gram(whitener: Array, columns: Array, starts: Array) -> Gram:
 
 def explained(products: Array, base: list[int], more: list[int]) -> float:
     """Fall of -log p when columns `more` join columns `base` in the fit of the last one; products (n, n)."""
-    return _left(products, base) - _left(products, [*base, *more])
+    return left_over(products, base) - left_over(products, [*base, *more])
 
 
-def _left(products: Array, columns: list[int]) -> float:
+def left_over(products: Array, columns: list[int]) -> float:
     """Half the squares that a fit of the last column by some others leaves."""
     last = len(products) - 1
     if not columns:

@@ -58,5 +58,15 @@ def cut(log: Log, rows: int, stride: int | None = None, session: Array | None = 
     )  # fmt: skip
 
 
+def uncut(commands: Array, period: float) -> Windows:
+    """Commands (inputs, samples, 2) as runs even at a period [s], each one window of zero poses."""
+    count, samples, _ = commands.shape
+    t = np.tile(period * np.arange(samples)[:, None], (1, count))
+    return Windows(
+        t=t, session=np.zeros(count), command=np.asarray(commands).transpose(1, 0, 2), step=np.full(t.shape, period),
+        pose=np.zeros((*t.shape, 3)), seen=np.ones(t.shape, bool), run=np.arange(count), first=np.zeros(count, int),
+    )  # fmt: skip
+
+
 SMALLEST = 8
 """Poses that a window needs: fewer say nothing beyond its start state."""

@@ -1,0 +1,128 @@
+"""The next run: of many inputs within a limit, the one whose answer best separates two effects.
+
+Separation of A and B: with data of a robot that has A, by how much -log p of the best B exceeds that of A; or the other
+way round, whichever is less. To first order it is half the squares, in units of the noise, of what the change that A
+makes leaves when start states, nominal parameters and B are fitted to it (T-optimality: Atkinson and Fedorov 1975,
+Biometrika 62). The first order overrates what changed parameters make good: full refits separate more, by up to ten
+times where the effects are large. The same windows as in a diagnosis; NumPy around the compiled follower.
+"""
+
+from typing import NamedTuple
+
+import jax
+import numpy as np
+
+from jaxident.array_types import Array
+from jaxident.diagnosis.coordinates import NOMINAL
+from jaxident.diagnosis.linear import START_STATES, follow, gram, left_over, linearise
+from jaxident.diagnosis.noise import whitener_of
+from jaxident.diagnosis.paths import track
+from jaxident.diagnosis.question import Question, ask, check_names, expected_size, noise_of
+from jaxident.diagnosis.responses import respond
+from jaxident.diagnosis.trial_inputs import ORDINARY, draw, make, vary
+from jaxident.diagnosis.windows import Windows, cut, uncut
+from jaxident.log import Log, make_log
+from jaxident.numerics import require_float64
+from jaxident.robot.model import Model
+from jaxident.robot.noise import Noise
+
+TOGETHER = 8
+"""Inputs that one call follows: one shape of the compiled program for all."""
+KEPT = 8
+"""Best inputs from which new ones are made."""
+
+
+class Plan(NamedTuple):
+    """The next input as a log without poses; the separation `before`, the median of ordinary inputs as long, and
+    `after`, in units of log-likelihood; the sizes of both effects by parameter and the noise that they are for;
+    `assumed`: the camera noise is not all the model's; `area` [m]: width and height of the path without the effects."""
+
+    log: Log
+    before: float
+    after: float
+    sizes: dict[str, dict[str, float]]
+    noise: Noise
+    assumed: bool
+    area: tuple[float, float]
+    ordinary: str = f"median of {TOGETHER} inputs `{ORDINARY[0]}` held {ORDINARY[1]} samples, as long"
+
+
+def plan(
+    model: Model, effects: tuple[str, str], *, samples: int = 600, limit: float = 1.0, seed: int = 0, batches: int = 40
+) -> Plan:
+    """The input (samples,) with |u| <= limit that best separates two effects on the robot of `model`, from rest.
+
+    An effect has the size that the model gives it, else the catalogue's typical one with the limit as unit of command;
+    other effects of the model act throughout. `batches` of 8 inputs are tried: in the first half drawn, then made from
+    the best. The same seed gives the same plan. Needs double precision. InputError for names that cannot be separated,
+    a model of free numerators, a limit inside the dead zones, and too few samples.
+    """
+    require_float64("plan")
+    check_names(effects)
+    noise, assumed = noise_of(model)
+    sizes = {name: expected_size(model, name, limit, samples) for name in effects}
+    question = ask(model, effects, sizes, noise, samples, limit)
+    rng = np.random.default_rng(seed)
+    kind, hold = ORDINARY
+    pool = [make(rng, kind, samples, hold) for _ in range(TOGETHER)]
+    values = separations(question, np.stack(pool))
+    before = float(np.median(values))
+    for batch in range(batches):
+        period = question.period
+        if 2 * batch < batches:
+            tried = [draw(rng, samples, period) for _ in range(TOGETHER)]
+        else:
+            tried = [vary(rng, pool[k], pool[rng.integers(len(pool))], period) for k in range(len(pool))]
+        both, found = [*pool, *tried], np.concatenate([values, separations(question, np.stack(tried))])
+        best = np.argsort(-found, kind="stable")[:KEPT]
+        pool, values = [both[k] for k in best], found[best]
+    command = limit * pool[0]
+    path = _paths(question.base, uncut(np.stack(pool), question.period))
+    area = (float(np.ptp(path[0, :, 0])), float(np.ptp(path[1, :, 0])))
+    log = make_log(question.period * np.arange(samples), command[:, 0], command[:, 1])
+    return Plan(log, before, float(values[0]), sizes, noise, assumed, area)
+
+
+def separations(question: Question, commands: Array) -> np.ndarray:
+    """The separation (inputs,) that each of some commands (inputs, samples, 2) over the limit would give."""
+    count, samples, _ = commands.shape
+    states = _paths(question.base, uncut(commands, question.period))
+    x, y, theta = (states[k].T.ravel() for k in range(3))
+    t, run = np.tile(question.period * np.arange(samples), count), np.repeat(np.arange(count), samples)
+    right, left = commands.reshape(-1, 2).T
+    log = make_log(t, right, left, x, y, theta, run)
+    windows = cut(log, question.rows, session=np.zeros(count))
+    starts = states[:, windows.first, windows.run]
+    linear = linearise(question.base, starts, windows, list(range(len(NOMINAL))))
+    moved = follow(question.vectors, np.broadcast_to(starts, (len(question.vectors), *starts.shape)), windows)
+    columns = np.concatenate([linear.slopes, np.moveaxis(linear.residual - moved, 0, -1)], axis=2)
+    products = gram(_whitener(question, linear.residual, windows), columns, linear.starts).products
+    return np.array([_separation(question, products[windows.run == run].sum(axis=0)) for run in range(count)])
+
+
+def _separation(question: Question, products: Array) -> float:
+    """The less of both: what B leaves of A, and A of B."""
+    nominal = list(range(len(NOMINAL)))
+    left = []
+    for expected, rays in zip(question.expected, question.rays[::-1], strict=True):
+        for ray in rays:
+            order = [*nominal, *(len(nominal) + place for place in (*ray, expected))]
+            left.append(left_over(products[np.ix_(order, order)], list(range(len(order) - 1))))
+    return max(min(left), 0.0)
+
+
+def _whitener(question: Question, residual: Array, windows: Windows) -> np.ndarray:
+    """Of the noise law; the same for all windows where it is white."""
+    law = question.law
+    if law.slip is None and law.coloured is None:
+        camera = np.array([law.position, law.position, law.heading])
+        return np.diag(np.tile(1.0 / camera, question.rows))[None]
+    return whitener_of(law, windows, respond(np.exp(question.base[:2]), residual, windows))
+
+
+_track = jax.jit(track)
+
+
+def _paths(base: Array, whole: Windows) -> np.ndarray:
+    """States (5, samples, inputs) of the robot from rest at the origin."""
+    return np.stack(_track(base, np.zeros((START_STATES, len(whole.run))), whole))
