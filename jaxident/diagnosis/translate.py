@@ -97,3 +97,8 @@ def noise_of(law: Law) -> Noise:
     slip = law.slip or (0.0, 0.0)
     density = float(np.sqrt(2.0 * law.slip_time)) if law.slip_time else 0.0
     return Noise(law.position, law.heading, None, slip[0] * density, slip[1] * density)
+
+
+def scaled(point: Array, largest: float) -> np.ndarray:
+    """Nominal coordinates for commands over `largest` as those in the user's unit."""
+    return np.concatenate([point[:2], point[2:10] * float(largest) ** _POWERS[2:]])
