@@ -23,8 +23,7 @@ def command(model, between, samples, limit, out, seed, json_file):
     """The next input to record: the one that best separates two effects on the robot of MODEL, from rest.
 
     The separation is how much likelier the right effect makes the data than the other one, both refitted: the
-    difference of the logarithms, to first order, which is cautious. An effect has the size that MODEL gives it, else a
-    typical one.
+    difference of the logarithms, to first order. An effect has the size that MODEL gives it, else a typical one.
 
     Example: jaxident plan model.json --between transport_delay,motor_lag --limit 0.8 --out next.csv
     """

@@ -75,9 +75,12 @@ COORDINATES: dict[str, tuple[Coordinate, ...]] = {
 
 SMOOTH = tuple(
     name for name in COORDINATES
-    if name not in ("input_saturation", "input_quantisation", "stiction", "payload_change")
+    if name not in ("input_saturation", "input_quantisation", "input_rate_limit", "stiction", "payload_change")
 )  # fmt: skip
 """Effects whose score is a derivative at neutral; the others are looked for from `seeds`."""
+
+STEPPED = {("input_quantisation", "step")}
+"""Coordinates that poses follow in jumps: looked for on a grid alone."""
 
 SHAPES = {("stiction", "fade"), ("payload_change", "instant"), ("lens_distortion", "centre_x"),
           ("lens_distortion", "centre_y")}  # fmt: skip

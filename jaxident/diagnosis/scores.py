@@ -3,7 +3,15 @@
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.coordinates import COORDINATES, PLACES, SHAPES, SMOOTH, from_catalogue, unit_factors
+from jaxident.diagnosis.coordinates import (
+    COORDINATES,
+    PLACES,
+    SHAPES,
+    SMOOTH,
+    STEPPED,
+    from_catalogue,
+    unit_factors,
+)
 from jaxident.diagnosis.linear import explained, follow, gram, linearise, normal
 from jaxident.diagnosis.search import Data, Solution
 from jaxident.diagnosis.windows import Windows
@@ -15,7 +23,9 @@ def seeds(name: str, windows: Windows) -> list[dict[str, float]]:
     if name == "input_saturation":
         return [{"level": level} for level in (0.9, 0.75, 0.6, 0.45, 0.3)]
     if name == "input_quantisation":
-        return [{"step": float(step)} for step in np.geomspace(0.02, 0.4, 40)]  # a sawtooth is lost a few % beside
+        return [{"step": float(step)} for step in np.geomspace(0.02, 0.4, 96)]  # a sawtooth is lost a few % beside
+    if name == "input_rate_limit":
+        return [{"inverse_rate": inverse} for inverse in (0.03, 0.07, 0.15, 0.3, 0.6)]
     if name == "stiction":
         return [{"right": s, "left": s, "fade": fade} for s, fade in ((0.05, 0.05), (0.15, 0.05), (0.1, 0.15))]
     if name == "payload_change":
@@ -72,18 +82,30 @@ def _differences(data: Data, solution: Solution, vectors: list[np.ndarray]) -> n
     return np.moveaxis(solution.linear.residual[None] - follow(np.stack(vectors), starts, data.windows), 0, -1)
 
 
-def best_seed(data: Data, solution: Solution, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Where to start the refit of one more effect: at neutral, or at the seed that promises most."""
+def beginnings(data: Data, solution: Solution, name: str) -> list[np.ndarray]:
+    """Vectors from which to refit one more effect: neutral; or the seed that promises most, and one of middling size,
+    for at a fit that a large effect has bent the promises mislead."""
     points = seeds(name, data.windows)
     if name in SMOOTH or len(points) == 1:
-        return seeded(solution.vector, name, points[0]), solution.starts
+        return [seeded(solution.vector, name, points[0])]
+    vectors, gains = _promises(data, solution, name, points)
+    best = int(np.argmax(gains))
+    if any((name, key) in STEPPED for key in points[best]):
+        near = [{key: v * part for key, v in points[best].items()} for part in np.linspace(0.97, 1.03, 16)]
+        vectors, gains = _promises(data, solution, name, near)
+        return [vectors[int(np.argmax(gains))]]
+    middle = (3 * len(points)) // 5
+    return [vectors[best]] if best == middle else [vectors[best], vectors[middle]]
+
+
+def _promises(data: Data, solution: Solution, name: str, points) -> tuple[list[np.ndarray], list[float]]:
+    """Vectors with an effect at some seeds, and the gain that each promises."""
     vectors = [seeded(solution.vector, name, seed) for seed in points]
     change = _differences(data, solution, vectors)
     columns = np.concatenate([solution.linear.slopes, change, solution.linear.residual[..., None]], axis=2)[data.use]
     products = gram(data.whitener[data.use], columns, solution.linear.starts[data.use]).products.sum(axis=0)
     base = list(range(len(solution.places)))
-    gains = [explained(products, base, [len(base) + k]) for k in range(len(points))]
-    return vectors[int(np.argmax(gains))], solution.starts
+    return vectors, [explained(products, base, [len(base) + k]) for k in range(len(points))]
 
 
 def visible(data: Data, nominal: Solution, largest: float, duration: float) -> dict[str, float]:

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.coordinates import PLACES, free_places, limits
+from jaxident.diagnosis.coordinates import PLACES, STEPPED, free_places, limits
 from jaxident.diagnosis.linear import Linear, follow, gram, linearise, normal
 from jaxident.diagnosis.windows import Windows
 
@@ -39,7 +39,7 @@ class Solution(NamedTuple):
 
 def refit(data: Data, vector: Array, starts: Array, effects: tuple[str, ...], hold: tuple = (), most=MOST_STEPS):
     """The fit nearest downhill of a vector and starts with the coordinates of `effects` free, but those in `hold`."""
-    held = {PLACES[pair] for pair in hold}
+    held = {PLACES[pair] for pair in {*hold, *STEPPED}}
     places = [place for place in free_places(effects) if place not in held]
     vector, starts = np.array(vector), np.array(starts)
     low, high = (bound[places] for bound in limits())

@@ -10,7 +10,7 @@ from jaxident.diagnosis.corrector import library, pursue
 from jaxident.diagnosis.linear import gram
 from jaxident.diagnosis.noise import Law, size_noise, whitener_of
 from jaxident.diagnosis.responses import Responses, respond
-from jaxident.diagnosis.scores import best_seed, score
+from jaxident.diagnosis.scores import beginnings, score
 from jaxident.diagnosis.search import Data, Solution, refit
 from jaxident.diagnosis.windows import Windows
 from jaxident.effects.catalogue import CATALOGUE
@@ -107,14 +107,19 @@ def _try(found: dict, data: Data, begin: Solution, names: list[str], beside: tup
     cost = found[()].solution.cost
     for name in names:
         effects = (*beside, name)
-        vector, starts = best_seed(data, begin, name)
-        shapes = tuple(pair for pair in SHAPES if pair[0] == name)
-        if shapes:  # what only shapes an effect is lost on it until its size is found
-            first = refit(data, vector, starts, effects, shapes, most=4)
-            vector, starts = first.vector, first.starts
-        solution = refit(data, vector, starts, effects)
-        if effects not in found or solution.cost < found[effects].solution.cost:
-            found[effects] = Candidate(effects, solution, cost - solution.cost)
+        for vector in beginnings(data, begin, name):
+            solution = _refit_with_shapes(data, vector, begin.starts, effects)
+            if effects not in found or solution.cost < found[effects].solution.cost:
+                found[effects] = Candidate(effects, solution, cost - solution.cost)
+
+
+def _refit_with_shapes(data: Data, vector: Array, starts: Array, effects: tuple[str, ...]) -> Solution:
+    """A refit that first finds the size of the last effect: what only shapes it is lost until then."""
+    shapes = tuple(pair for pair in SHAPES if pair[0] == effects[-1])
+    if shapes:
+        first = refit(data, vector, starts, effects, shapes, most=4)
+        vector, starts = first.vector, first.starts
+    return refit(data, vector, starts, effects)
 
 
 def _grow(found: dict, data: Data) -> tuple[str, ...]:
