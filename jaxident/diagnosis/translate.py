@@ -61,6 +61,8 @@ def effect_of(name: str, solution: Solution, largest: float) -> Effect:
     factors = unit_factors(name, largest)
     values = {key: v * factors[key] for key, v in to_catalogue(name, here).items()}
     places = [solution.places.index(PLACES[name, key]) for key in coordinates if PLACES[name, key] in solution.places]
+    if not places:  # looked for on a grid alone
+        return Effect(name, values)
     own = solution.covariance[np.ix_(places, places)]
     slopes = []
     for place in places:

@@ -1,0 +1,62 @@
+"""Gram matrices, greedy terms and answers in closed form against plain least squares and differences."""
+
+import numpy as np
+import pytest
+
+from jaxident.diagnosis.coordinates import neutral_vector, nominal_vector
+from jaxident.diagnosis.corrector import pursue
+from jaxident.diagnosis.linear import explained, follow, gram
+from jaxident.diagnosis.responses import answer_to_start
+from jaxident.diagnosis.windows import cut
+from jaxident.log import make_log
+from jaxident.robot.drive import Physical
+
+
+def squares(columns, target):
+    """Half the squares that least squares leaves."""
+    rest = target - columns @ np.linalg.lstsq(columns, target, rcond=None)[0]
+    return 0.5 * float(rest @ rest)
+
+
+def test_explained_is_a_difference_of_least_squares_with_starts_free():
+    rng = np.random.default_rng(0)
+    windows, numbers = 4, 30
+    columns, starts = rng.normal(size=(windows, numbers, 5)), rng.normal(size=(windows, numbers, 5))
+    white = rng.normal(size=(windows, numbers, numbers)) + 5.0 * np.eye(numbers)
+    products = gram(white, columns, starts).products.sum(axis=0)
+    own = np.zeros((windows * numbers, windows * 5))
+    for k in range(windows):
+        own[k * numbers : (k + 1) * numbers, 5 * k : 5 * k + 5] = white[k] @ starts[k]
+    flat = (white @ columns).reshape(-1, 5)
+    with_one = squares(np.hstack([own, flat[:, [0]]]), flat[:, 4])
+    with_three = squares(np.hstack([own, flat[:, [0, 1, 2]]]), flat[:, 4])
+    assert explained(products, [0], [1, 2]) == pytest.approx(with_one - with_three, rel=1e-6)
+
+
+def test_pursuit_finds_what_was_put_in_and_stops():
+    rng = np.random.default_rng(1)
+    table = rng.normal(size=(2000, 42))
+    target = 0.5 * table[:, 0] + 0.4 * table[:, 7] - 0.2 * table[:, 20] + rng.normal(size=2000)
+    whole = np.column_stack([table, target])
+    chosen = pursue(whole.T @ whole, [0, 1], list(range(2, 42)))
+    assert [place for place, _ in chosen] == [7, 20]
+    rest = squares(table[:, [0, 1]], target) - squares(table[:, [0, 1, 7]], target)
+    assert chosen[0][1] == pytest.approx(rest, rel=1e-6)
+
+
+def test_start_states_answer_as_differences_do():
+    rng = np.random.default_rng(2)
+    rows = 40
+    u = np.repeat(rng.uniform(-1.0, 1.0, (4, 2)), 10, axis=0)
+    t = np.arange(rows) * 0.03
+    log = make_log(t, u[:, 0], u[:, 1], 0.0 * t, 0.0 * t, 0.0 * t)
+    windows = cut(log, rows)
+    drive = Physical(np.array([4.0, 5.0]), np.array([[1.2, 1.1], [9.0, -8.5]]))
+    vector = neutral_vector(nominal_vector(drive, np.array([0.1, 0.1])))
+    start = np.array([[0.3], [-0.2], [0.5], [0.2], [1.0]])
+    lanes = start + 1e-6 * np.concatenate([np.zeros((1, 5)), np.eye(5)])[:, :, None]
+    found = follow(np.tile(vector, (6, 1)), lanes, windows)
+    wanted = np.moveaxis((found[:1] - found[1:]) / 1e-6, 0, -1)
+    own = answer_to_start(np.exp(vector[:2]), found[0], windows)
+    # headings between rows are taken as straight: a few parts in a thousand
+    np.testing.assert_allclose(own, wanted, atol=5e-3 * np.abs(wanted).max())

@@ -1,0 +1,82 @@
+"""Sizes of camera noise and slip from residuals drawn with known ones."""
+
+import numpy as np
+import pytest
+
+from jaxident.diagnosis.noise import Law, covariance, first_law, size_noise, whitener_of
+from jaxident.diagnosis.responses import answer_to_start, respond
+from jaxident.diagnosis.windows import Windows
+
+ROWS, COUNT, STEP = 45, 60, 0.03
+RATES = np.array([4.0, 5.0])
+
+
+@pytest.fixture(scope="module")
+def made():
+    """Windows along made-up arcs, answers about them."""
+    rng = np.random.default_rng(1)
+    time = np.arange(ROWS)[:, None] * STEP
+    theta = rng.uniform(-3.0, 3.0, COUNT) + rng.uniform(-2.0, 2.0, COUNT) * time
+    v = rng.uniform(0.1, 0.4, COUNT)
+    x, y = np.cumsum(v * STEP * np.cos(theta), axis=0), np.cumsum(v * STEP * np.sin(theta), axis=0)
+    windows = Windows(
+        t=np.arange(ROWS * COUNT)[:, None] * STEP, session=np.zeros(1), command=np.zeros((ROWS * COUNT, 1, 2)),
+        step=np.full((ROWS, COUNT), STEP), pose=np.stack([x, y, theta], axis=-1), seen=np.ones((ROWS, COUNT), bool),
+        run=np.zeros(COUNT, int), first=np.arange(COUNT) * ROWS,
+    )  # fmt: skip
+    nothing = np.zeros((COUNT, 3 * ROWS))
+    return windows, respond(RATES, nothing, windows), answer_to_start(RATES, nothing, windows)
+
+
+def sized(law, made, seed):
+    """The law found from residuals drawn under another, start states left where a fit would leave them anywhere."""
+    windows, responses, starts = made
+    rng = np.random.default_rng(seed)
+    factor = np.linalg.cholesky(covariance(law, windows, responses))
+    noise = (factor @ rng.normal(size=(COUNT, 3 * ROWS, 1)))[..., 0]
+    residual = noise + (starts @ (0.01 * rng.normal(size=(COUNT, 5, 1))))[..., 0]
+    measured = windows._replace(pose=windows.pose + noise.reshape(COUNT, ROWS, 3).transpose(1, 0, 2))
+    return size_noise(residual, starts, measured, responses, np.ones(COUNT, bool))
+
+
+def test_whitener_whitens(made):
+    windows, responses, _ = made
+    law = Law(5e-4, 4e-3, (0.02, 0.2), 0.2)
+    white = whitener_of(law, windows, responses)
+    unit = white @ covariance(law, windows, responses) @ white.transpose(0, 2, 1)
+    np.testing.assert_allclose(unit, np.broadcast_to(np.eye(3 * ROWS), unit.shape), atol=1e-8)
+
+
+def test_white_noise_stays_white(made):
+    law = Law(5e-4, 4e-3)
+    found = sized(law, made, 2)
+    assert found.slip is None
+    assert found.coloured is None
+    # about 2000 positions and 1000 headings: standard errors of 1.6 and 2.2 %, start states aside
+    assert found.position == pytest.approx(law.position, rel=0.08)
+    assert found.heading == pytest.approx(law.heading, rel=0.1)
+
+
+def test_slip_is_found_and_sized(made):
+    law = Law(5e-4, 4e-3, (0.03, 0.4), 0.2)
+    found = sized(law, made, 3)
+    assert found.slip is not None
+    assert found.slip_time == 0.2
+    np.testing.assert_allclose(found.slip, law.slip, rtol=0.3)
+    assert found.coloured is None
+
+
+def test_camera_memory_is_not_taken_for_slip(made):
+    law = Law(3e-4, 3e-3, coloured=(1e-3, 1e-2), coloured_time=0.5)
+    found = sized(law, made, 4)
+    assert found.coloured is not None
+    np.testing.assert_allclose(found.coloured, law.coloured, rtol=0.4)
+
+
+def test_fourth_differences_size_the_camera(made):
+    windows, _, _ = made
+    rng = np.random.default_rng(5)
+    noisy = windows.pose + rng.normal(size=windows.pose.shape) * [5e-4, 5e-4, 4e-3]
+    found = first_law(windows._replace(pose=noisy))
+    assert found.position == pytest.approx(5e-4, rel=0.1)
+    assert found.heading == pytest.approx(4e-3, rel=0.1)

@@ -1,0 +1,95 @@
+"""The follower of windows against the full simulator, which integrates with other steps and another rule."""
+
+import jax
+import numpy as np
+import pytest
+
+from jaxident.diagnosis.coordinates import (
+    COORDINATES,
+    PLACES,
+    SIZE,
+    by_effect,
+    from_catalogue,
+    neutral_vector,
+    nominal_vector,
+)
+from jaxident.diagnosis.paths import report, residuals, track
+from jaxident.diagnosis.windows import cut
+from jaxident.effects.catalogue import CATALOGUE
+from jaxident.effects.simulate import simulate
+from jaxident.log import make_log
+from jaxident.robot.drive import Physical
+from jaxident.robot.model import Effect, Model
+
+STEP, ROWS = 0.03, 200
+DRIVE = Physical(np.array([4.0, 5.0]), np.array([[1.2, 1.1], [9.0, -8.5]]), np.array([0.02, -1.0]))
+DEAD_ZONE = np.array([0.1, 0.12])
+TOLERANCE = {
+    "stiction": 0.1,
+    "traction_limit": 0.05,
+    "transport_delay": 0.02,
+    "motor_lag": 0.02,
+    "payload_change": 0.05,
+}
+"""Largest error as a part of what the effect does; 0.01 for the others."""
+
+
+@pytest.fixture(scope="module")
+def log():
+    rng = np.random.default_rng(4)
+    u = np.repeat(rng.uniform(-1.0, 1.0, (ROWS // 10, 2)), 10, axis=0)
+    t = np.arange(ROWS) * STEP
+    return make_log(t, u[:, 0], u[:, 1], 0.0 * t, 0.0 * t, 0.0 * t)
+
+
+@pytest.fixture(scope="module")
+def follow(log):
+    windows = cut(log, ROWS)
+    compiled = jax.jit(lambda vector: report(by_effect(vector), track(vector, np.zeros((5, 1)), windows)))
+    return lambda vector: np.stack([np.asarray(part)[:, 0] for part in compiled(vector)])
+
+
+def nominal() -> np.ndarray:
+    return neutral_vector(nominal_vector(DRIVE, DEAD_ZONE))
+
+
+def simulated(log, effects=()) -> np.ndarray:
+    return np.stack(simulate(Model(STEP, DRIVE, DEAD_ZONE, effects=effects), log).pose)
+
+
+def test_without_effects_it_is_the_nominal_robot(log, follow):
+    # coupling is held over a substep here and exact there
+    np.testing.assert_allclose(follow(nominal()), simulated(log), atol=3e-4)
+
+
+@pytest.mark.parametrize("name", COORDINATES)
+def test_every_effect_is_that_of_the_full_simulator(log, follow, name):
+    typical = CATALOGUE[name].typical() | ({"instant": 2.0} if name == "payload_change" else {})
+    vector = nominal()
+    for key, value in from_catalogue(name, typical).items():
+        vector[PLACES[name, key]] = value
+    wanted = simulated(log, (Effect(name, typical),)) - simulated(log)
+    found = follow(vector) - follow(nominal())
+    scale = np.abs(wanted).max(axis=1).max()
+    assert scale > 1e-3
+    assert np.abs(found - wanted).max() < TOLERANCE.get(name, 0.01) * scale
+
+
+def test_windows_start_where_they_are_told(log):
+    """Cut in two, each half from the state that the whole has there, the path is the whole's."""
+    whole, halves = cut(log, ROWS), cut(log, ROWS // 2)
+    vector = nominal()
+    follow = jax.jit(track)
+    states = np.stack([np.asarray(part)[:, 0] for part in follow(vector, np.zeros((5, 1)), whole)])
+    starts = states[:, [0, ROWS // 2]]
+    parts = np.stack(follow(vector, starts, halves))
+    np.testing.assert_allclose(np.concatenate(parts.transpose(2, 0, 1), axis=1), states, atol=1e-10)
+
+
+def test_unseen_poses_leave_no_residual(log):
+    hidden = log._replace(x=np.where(np.arange(ROWS) == 7, np.nan, log.x))
+    found = np.asarray(jax.jit(residuals)(nominal(), np.zeros((5, 1)), cut(hidden, ROWS)))
+    assert np.all(found[7] == 0.0)
+    assert np.all(np.isfinite(found))
+    assert np.any(found[8] != 0.0)
+    assert len(nominal()) == SIZE
