@@ -9,6 +9,8 @@ from jaxident.diagnosis.gap import CHANNELS
 from jaxident.diagnosis.responses import modelled_path
 from jaxident.diagnosis.windows import Windows
 
+OF_COMMANDS = ("u_r", "u_l", "|u|", "largest |u|")
+"""Variables in commands over their largest."""
 BINS = 4
 SHUFFLES = 2000
 DISCOVERIES = 0.05

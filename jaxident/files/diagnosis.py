@@ -3,6 +3,7 @@
 from typing import Any
 
 from jaxident.diagnosis.diagnose import Diagnosis, Gap
+from jaxident.diagnosis.where import OF_COMMANDS, Region
 from jaxident.effects.catalogue import CATALOGUE
 
 SCHEMA = "jaxident.diagnosis/1"
@@ -23,10 +24,7 @@ def diagnosis_to_dict(found: Diagnosis) -> dict[str, Any]:
         "where": {
             "site": judgement.sites,
             "channels": found.where.channels,
-            "regions": [
-                {"variable": r.variable, "from": r.low, "to": r.high, "share": r.share, "p_value": r.p_value}
-                for r in found.where.regions
-            ],
+            "regions": [_region(region, found.prepared.largest) for region in found.where.regions],
         },
         "causes": _causes(found),
         "selected": list(found.selected),
@@ -52,6 +50,18 @@ def _gap(gap: Gap) -> dict[str, Any]:
         "shrink": gap.shrink.value,
         "shrink_interval": _listed(gap.shrink.interval),
         "placebo": placebo,
+    }
+
+
+def _region(region: Region, largest: float) -> dict[str, Any]:
+    """One region, edges of command variables in the user's unit."""
+    factor = largest if region.variable in OF_COMMANDS else 1.0
+    return {
+        "variable": region.variable,
+        "from": factor * region.low,
+        "to": factor * region.high,
+        "share": region.share,
+        "p_value": region.p_value,
     }
 
 

@@ -1,0 +1,56 @@
+"""`jaxident diagnose`, as a user runs it: quickly what it refuses, and slowly what it finds."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from jaxident.cli.diagnose import command
+from jaxident.errors import InputError
+from jaxident.files.logs import write_log
+from jaxident.log import make_log
+
+
+@pytest.fixture(autouse=True)
+def started(monkeypatch):
+    monkeypatch.setattr("jaxident.cli.diagnose.start_jax", lambda: None)  # the tests' own start has no cache
+
+
+def refused(*words) -> str:
+    result = CliRunner().invoke(command, list(words))
+    assert isinstance(result.exception, InputError), result
+    return str(result.exception)
+
+
+def test_a_robot_that_stands_is_refused(tmp_path):
+    rng = np.random.default_rng(0)
+    t = np.arange(200) * 0.05
+    write_log(make_log(t, rng.normal(size=200), rng.normal(size=200), *(1e-3 * rng.normal(size=(3, 200)))),
+              tmp_path / "log.csv")  # fmt: skip
+    assert "nothing moves" in refused(str(tmp_path / "log.csv"), "--out", str(tmp_path / "out"))
+    assert not (tmp_path / "out").exists()
+
+
+def test_missing_files_and_models_are_refused(tmp_path):
+    assert "nowhere.csv" in refused(str(tmp_path / "nowhere.csv"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("effect", ["none", "turn_loss", "transport_delay"])
+def test_the_effect_of_an_example_is_found(tmp_path, effect):
+    """Example logs with a hidden effect, and without: some minutes."""
+    from jaxident.cli.example import command as example
+
+    logs, out = tmp_path / "logs", tmp_path / "out"
+    assert CliRunner().invoke(example, ["--effect", effect, "--out", str(logs)]).exit_code == 0
+    result = CliRunner().invoke(command, [str(logs), "--out", str(out)])
+    assert result.exit_code == 0, result
+    found = json.loads((out / "diagnosis.json").read_text())
+    assert found["verdict"] == ("no_gap" if effect == "none" else "effects")
+    if effect != "none":
+        alike = {name for cause in found["causes"][:1] for name in (cause["effect"], *cause["indistinguishable_from"])}
+        assert effect in alike
+    assert {path.name for path in out.iterdir()} == {
+        "diagnosis.json", "nominal_model.json", "corrected_model.json", "report.html",
+    }  # fmt: skip

@@ -1,0 +1,63 @@
+"""Probabilities from evidence that is made up."""
+
+from support.diagnoses import made_up
+
+from jaxident.diagnosis.corrector import Term
+from jaxident.diagnosis.verdict import alike, judge, unknown_probability
+from jaxident.diagnosis.which import Candidate
+
+NONE: dict[str, float] = {}
+
+
+def finding(gains, selected, terms=()):
+    """A search with candidates of some gains."""
+    found = made_up("effects").finding
+    candidates = {effects: Candidate(effects, None, gain) for effects, gain in {(): 0.0, **gains}.items()}
+    return found._replace(candidates=candidates, selected=selected, terms=list(terms))
+
+
+def whole(judgement):
+    return judgement.none + judgement.unknown + sum(p for _, p in judgement.sets)
+
+
+def test_a_large_gain_names_its_effect():
+    found = judge(finding({("slope",): 500.0, ("turn_loss",): 30.0}, ("slope",)), NONE)
+    assert abs(whole(found) - 1.0) < 1e-9
+    assert found.causes[0].effect == "slope"
+    assert found.causes[0].probability > 0.99
+    assert found.sites["contact"] > 0.99
+
+
+def test_gains_by_chance_are_no_effect():
+    found = judge(finding({("slope",): 4.0, ("turn_loss",): 5.0}, ()), NONE)
+    assert found.none > 0.95
+    assert abs(whole(found) - 1.0) < 1e-9
+
+
+def test_effects_nearly_as_good_are_named_together():
+    found = finding({("transport_delay",): 503.0, ("motor_lag",): 500.0, ("slope",): 400.0}, ("transport_delay",))
+    assert alike(found, "transport_delay") == ("motor_lag",)
+    assert (
+        alike(finding({("transport_delay",): 503.0, ("motor_lag",): 450.0}, ("transport_delay",)), "transport_delay")
+        == ()
+    )
+
+
+def test_what_the_corrector_explains_beside_a_poor_effect_is_unknown():
+    term = (Term("drive", "v^3 in the acceleration along"), 400.0)
+    found = finding({("slope",): 300.0}, ("slope",), [term])
+    assert unknown_probability(found) > 0.95
+    assert judge(found, NONE).sites["drive"] > 0.9
+    assert unknown_probability(finding({("slope",): 9000.0}, ("slope",), [term])) < 0.05
+    assert unknown_probability(finding({}, (), [(term[0], 10.0)])) < 0.2
+
+
+def test_frames_that_lie_are_an_effect_by_themselves():
+    found = judge(finding({}, ()), {"frozen_frames": 300.0})
+    assert found.none < 0.01
+    assert found.causes[0].effect == "frozen_frames"
+
+
+def test_what_the_simulator_has_too_is_no_gap():
+    found = judge(finding({("slope",): 500.0}, ("slope",)), NONE, ("slope",))
+    assert found.none > 0.99
