@@ -43,7 +43,7 @@ def command(logs, sim, model, horizon, out, seed):
     theirs = read_logs(sim) if sim else [read_log(path) for path in find_simulated(logs)]
     nominal = load_model(model) if model else None
     with working("diagnosing"):
-        found = diagnose(records, sim=theirs or None, model=nominal, horizon=horizon)
+        found = diagnose(records, sim=theirs or None, model=nominal, horizon=horizon, seed=seed)
     content = diagnosis_to_dict(found)
     click.echo(f"verdict: {SENTENCE[found.verdict].format(effects=' and '.join(found.selected))}")
     click.echo(table([("cause", "probability", "site"), *_causes(found)]))

@@ -47,7 +47,9 @@ def errors(vectors: Array, starts: Array, windows: Windows, law: Law, responses:
     return np.stack([np.where(seen[:, None], _turned(found, windows) / _variance(law), np.nan) for found in residual])
 
 
-def floor_of(vector: Array, residual: Array, windows: Windows, law: Law, responses: Responses, burn: int) -> Floor:
+def floor_of(
+    vector: Array, residual: Array, windows: Windows, law: Law, responses: Responses, burn: int, seed: int = 0
+) -> Floor:
     """The floor by replay of noise through the linear estimate about the path of a model with some residuals (windows,
     numbers)."""
     inverse, rows = _early(law, windows, responses, burn)
@@ -57,7 +59,7 @@ def floor_of(vector: Array, residual: Array, windows: Windows, law: Law, respons
     gain = np.linalg.solve(normal + 1e-9 * _scale(normal), early.transpose(0, 2, 1) @ inverse)
     factor = np.linalg.cholesky(covariance(law, windows, responses))
     weights = factor[:, -3:] - slope[:, -3:] @ gain @ factor[:, :rows]
-    draws = np.random.default_rng(0).normal(size=(*weights.shape[::2], REPLAYS))
+    draws = np.random.default_rng(seed).normal(size=(*weights.shape[::2], REPLAYS))
     replayed = weights @ draws
     heading = modelled_path(residual, windows)[2][:, -1]
     turned = _rotate(replayed, heading[:, None]) ** 2 / _variance(law)[None, :, None]
@@ -82,13 +84,13 @@ class Shrink(NamedTuple):
     interval: tuple[float, float] | None
 
 
-def shrink_of(refitted: Array, after: Array, floor: Floor) -> Shrink:
+def shrink_of(refitted: Array, after: Array, floor: Floor, seed: int = 0) -> Shrink:
     """The shrink from errors (windows, 3) before and after, with an interval by resampled windows and replays."""
     kept = np.isfinite(refitted).all(axis=1) & np.isfinite(after).all(axis=1)
     refitted, after = refitted[kept].mean(axis=1), after[kept].mean(axis=1)
     if not len(refitted) or refitted.mean() <= np.quantile(floor.replays, 0.95):
         return Shrink(None, None)
-    rng = np.random.default_rng(1)
+    rng = np.random.default_rng(seed)
     picks = _blocks(rng, len(refitted))
     # a floor per resample: its own spread is that of noise in as many windows
     top, bottom = after[picks].mean(axis=1) - floor.value, refitted[picks].mean(axis=1) - floor.value

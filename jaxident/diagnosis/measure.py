@@ -32,7 +32,7 @@ class Gap(NamedTuple):
     replay: Floor
 
 
-def measure(prepared: Prepared, finding: Finding, given, common) -> tuple[Gap, Place, dict[str, Shrink]]:
+def measure(prepared: Prepared, finding: Finding, given, common, seed: int = 0) -> tuple[Gap, Place, dict[str, Shrink]]:
     """The gap on windows kept for it, before and after, where it lies, and the shrink of each single effect; `given`
     (10,) or (SIZE,) is the model as given, `common` are effects that it has already."""
     rows = len(prepared.windows.step)
@@ -44,21 +44,21 @@ def measure(prepared: Prepared, finding: Finding, given, common) -> tuple[Gap, P
     vectors = np.stack([told, base, best.vector, *(c.solution.vector for c in singles.values())])
     responses, residual, starts = _settle(best.vector, windows, law)
     found = errors(vectors, np.tile(starts, (len(vectors), 1, 1)), windows, law, responses, BURN)
-    replay = floor_of(best.vector, residual, windows, law, responses, BURN)
+    replay = floor_of(best.vector, residual, windows, law, responses, BURN, seed)
     mean = np.nanmean(found, axis=(1, 2))
-    shrinks = {name: shrink_of(found[1], found[3 + k], replay) for k, name in enumerate(singles)}
+    shrinks = {name: shrink_of(found[1], found[3 + k], replay, seed) for k, name in enumerate(singles)}
     weakest = min(singles.values(), key=lambda c: c.gain, default=None)
     placebo = None if weakest is None else (weakest.effects[0], shrinks[weakest.effects[0]])
     spread = np.quantile(replay.replays, [0.05, 0.95])
     before, refitted, after = (float(value) for value in mean[:3])
     gap = Gap(
         prepared.horizon, before, refitted, after, replay.value, (float(spread[0]), float(spread[1])),
-        shrink_of(found[1], found[2], replay), placebo, found[:3], replay,
+        shrink_of(found[1], found[2], replay, seed), placebo, found[:3], replay,
     )  # fmt: skip
     seen = np.asarray(windows.seen)[-1]
     floor = np.full(found[1].shape, np.nan)
     floor[seen] = replay.channels
-    return gap, locate(found[1], floor, residual, windows), shrinks
+    return gap, locate(found[1], floor, residual, windows, seed), shrinks
 
 
 def judging_windows(prepared: Prepared, rows: int) -> Windows:

@@ -37,14 +37,14 @@ class Place(NamedTuple):
     table: dict[str, tuple[Any, Any]]
 
 
-def locate(errors: Array, floor: Array, residual: Array, windows: Windows) -> Place:
+def locate(errors: Array, floor: Array, residual: Array, windows: Windows, seed: int = 0) -> Place:
     """From errors and their floor (windows, 3) at the horizon, and the residuals (windows, numbers) of that model."""
     kept = np.isfinite(errors).all(axis=1)
     excess = (errors - floor)[kept]
     total = np.maximum(excess.mean(axis=0), 0.0)
     share = total / total.sum() if total.sum() > 0.0 else np.zeros(3)
     variables = {name: value[kept] for name, value in describe(residual, windows).items()}
-    return Place(dict(zip(CHANNELS, share.tolist(), strict=True)), *_regions(excess.mean(axis=1), variables))
+    return Place(dict(zip(CHANNELS, share.tolist(), strict=True)), *_regions(excess.mean(axis=1), variables, seed))
 
 
 def describe(residual: Array, windows: Windows) -> dict[str, np.ndarray]:
@@ -69,9 +69,9 @@ def describe(residual: Array, windows: Windows) -> dict[str, np.ndarray]:
     }  # fmt: skip
 
 
-def _regions(excess: Array, variables: dict[str, np.ndarray]) -> tuple[list[Region], dict]:
+def _regions(excess: Array, variables: dict[str, np.ndarray], seed: int = 0) -> tuple[list[Region], dict]:
     """Bins of each variable by its quantiles, tested by shuffling the excess over windows."""
-    rng = np.random.default_rng(3)
+    rng = np.random.default_rng(seed)
     shuffled = np.stack([rng.permutation(excess) for _ in range(SHUFFLES)])
     found, table = [], {}
     for name, value in variables.items():
