@@ -146,8 +146,9 @@ def _ahead(state, lag_v, lag_w, pull, time: Array, ramp):
 def _added(settings, drive: Physical, now, pull, ramp, place: float, lightness: Array, extra: Extra) -> list[Array]:
     """Accelerations by effects, dry friction left out."""
     theta, v, w = now
-    along = pull[0] + place * ramp[0] - drive.rate[0] * v
-    heading = pull[1] + place * ramp[1] - drive.rate[1] * w
+    across = drive.coupling[0] * w, drive.coupling[1] * v
+    along = pull[0] + place * ramp[0] - drive.rate[0] * v + across[0]
+    heading = pull[1] + place * ramp[1] - drive.rate[1] * w + across[1]
     (a, b), (c, d) = drive.gain
     determinant = a * d - b * c
     asked = (d * along - b * heading) / determinant, (a * heading - c * along) / determinant
@@ -161,17 +162,13 @@ def _added(settings, drive: Physical, now, pull, ramp, place: float, lightness: 
     sine, cosine = sin_cos(theta)
     incline = settings["slope"]["x"] * cosine + settings["slope"]["y"] * sine
     return [
-        drive.coupling[0] * w
+        across[0]
         + extra.along
         + sum(t.along for t in terms)
         + incline
         + lightness * lost[0]
         + (lightness - 1.0) * along,
-        drive.coupling[1] * v
-        + extra.heading
-        + sum(t.heading for t in terms)
-        + lightness * lost[1]
-        + (lightness - 1.0) * heading,
+        across[1] + extra.heading + sum(t.heading for t in terms) + lightness * lost[1] + (lightness - 1.0) * heading,
     ]
 
 
