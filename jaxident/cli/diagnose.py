@@ -17,9 +17,26 @@ SENTENCE = {
 }
 
 
-@click.command()
+class SeveralPerOption(click.Command):
+    """A command whose option --sim takes all words up to the next option, as a shell's pattern gives them."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Repeat the option before each of its words."""
+        spread, taking = [], False
+        for word in args:
+            if word == "--sim":
+                taking = True
+            elif taking and not word.startswith("--"):
+                spread += ["--sim", word]
+            else:
+                taking = False
+                spread.append(word)
+        return super().parse_args(ctx, spread)
+
+
+@click.command(cls=SeveralPerOption)
 @click.argument("logs", nargs=-1, required=True, metavar="LOG...")
-@click.option("--sim", multiple=True, metavar="LOG", help="Logs of your own simulator, repeatable: what does it lack?")
+@click.option("--sim", multiple=True, metavar="LOG...", help="Logs of your own simulator, after those of the robot.")
 @click.option("--model", metavar="MODEL", help="A nominal model to judge as it stands.")
 @click.option("--horizon", type=click.FloatRange(0, min_open=True), metavar="S", help="Seconds ahead (default: 1).")
 @click.option("--out", default="diagnosis", show_default=True, metavar="DIR", help="The folder to write.")
@@ -33,6 +50,7 @@ def command(logs, sim, model, horizon, out, seed):
     """
     start_jax()
     from jaxident.diagnosis.diagnose import diagnose
+    from jaxident.files.atomic import make_folder
     from jaxident.files.diagnosis import diagnosis_to_dict
     from jaxident.files.logs import find_simulated, read_log, read_logs
     from jaxident.files.models import load_model, save_model
@@ -42,14 +60,16 @@ def command(logs, sim, model, horizon, out, seed):
     records = read_logs(logs)
     theirs = read_logs(sim) if sim else [read_log(path) for path in find_simulated(logs)]
     nominal = load_model(model) if model else None
+    make_folder(out)  # a folder that cannot be made is told before the work, not after it
     with working("diagnosing"):
         found = diagnose(records, sim=theirs or None, model=nominal, horizon=horizon, seed=seed)
     content = diagnosis_to_dict(found)
     click.echo(f"verdict: {SENTENCE[found.verdict].format(effects=' and '.join(found.selected))}")
     click.echo(table([("cause", "probability", "site"), *_causes(found)]))
     click.echo(_gap(found))
+    if found.surplus:
+        click.echo(f"your simulator has, and the robot has not: {', '.join(found.surplus)}")
     click.echo(found.next)
-    os.makedirs(out, exist_ok=True)
     write_json(content, os.path.join(out, "diagnosis.json"))
     for name, written in (("nominal_model", found.nominal_model), ("corrected_model", found.corrected_model)):
         path = os.path.join(out, f"{name}.json")

@@ -17,7 +17,7 @@ from jaxident.diagnosis.windows import Windows
 LAGS = (1, 2, 4, 8)
 MOST_TERMS = 6
 WORTH = 9.0
-"""Fall of -log p that a term must bring: about the largest of a hundred by chance, once in a hundred times."""
+"""Fall of -log p that a term must bring: one of a hundred does so by chance once in 450 times (chi-squared at 18)."""
 
 
 class Term(NamedTuple):

@@ -18,8 +18,8 @@ from jaxident.log import Log
 from jaxident.numerics import require_float64
 from jaxident.robot.model import Model
 
-FEW = 6
-"""Windows that each purpose needs before anything is claimed."""
+FEW, FEWEST = 6, 2
+"""Windows that naming and judging need before anything is claimed."""
 DIFFERENT = 4.0
 """Standard deviations by which a parameter differs before the verdict says so."""
 
@@ -111,7 +111,7 @@ def compare_parameters(prepared: Prepared, finding: Finding, given) -> list[Para
 def decide(prepared: Prepared, judgement: Judgement, parameters: list[Parameter]) -> str:
     """The verdict."""
     naming, judging = int(prepared.naming.sum()), int((~prepared.naming).sum())
-    if naming < FEW or judging < 2:
+    if naming < FEW or judging < FEWEST:
         return "undecided"
     if judgement.unknown > 0.5:
         return "unknown"

@@ -10,7 +10,7 @@ def direct_evidence(prepared: Prepared, finding: Finding) -> dict[str, float]:
     frozen, outlying = int(prepared.frames.frozen.sum()), int(prepared.frames.outlying.sum())
     return {
         "frozen_frames": 10.0 * frozen if frozen >= 3 else 0.0,
-        # seven standard deviations by chance are less than one in 10^8 rows
+        # normal noise leaves OUTLYING deviations once in 10^11 rows
         "outliers": 10.0 * outlying if outlying >= max(3, 1e-4 * rows) else 0.0,
         "coloured_noise": 2.0 * ENOUGH if finding.law.coloured is not None else 0.0,
     }

@@ -34,14 +34,8 @@ def errors(vectors: Array, starts: Array, windows: Windows, law: Law, responses:
     """Squared pose errors over the camera's variance (models, windows, 3), along, lateral and in heading, at the last
     row of windows whose start states are estimated from their first `burn` rows; NaN where that row was not seen.
     vectors (models, SIZE), starts (models, 5, windows)."""
-    inverse, rows = _early(law, windows, responses, burn)
-    starts = np.array(starts)
-    for model, vector in enumerate(vectors):
-        for _ in range(STEPS):
-            found, slope = _by_start(vector, starts[model], windows, rows)
-            normal = slope.transpose(0, 2, 1) @ inverse @ slope
-            right = slope.transpose(0, 2, 1) @ inverse @ found[..., None]
-            starts[model] += np.linalg.solve(normal + 1e-9 * _scale(normal), right)[..., 0].T
+    inverse, _ = _early(law, windows, responses, burn)
+    starts = np.stack([settle(*pair, windows, inverse) for pair in zip(vectors, starts, strict=True)])
     residual = follow(vectors, starts, windows)
     seen = np.asarray(windows.seen)[-1]
     return np.stack([np.where(seen[:, None], _turned(found, windows) / _variance(law), np.nan) for found in residual])
@@ -66,6 +60,18 @@ def floor_of(
     seen = np.asarray(windows.seen)[-1]
     turned = turned[seen]
     return Floor(float(np.mean(turned)), turned.mean(axis=(0, 1)), turned.mean(axis=2))
+
+
+def settle(vector: Array, starts: Array, windows: Windows, inverse: Array) -> np.ndarray:
+    """Start states (5, windows) under a vector (SIZE,) that fit the first poses, as many as the inverse covariance
+    (windows, numbers, numbers) of their noise has; from some starts."""
+    starts = np.array(starts)
+    for _ in range(STEPS):
+        found, slope = _by_start(vector, starts, windows, inverse.shape[1])
+        normal = slope.transpose(0, 2, 1) @ inverse @ slope
+        right = slope.transpose(0, 2, 1) @ inverse @ found[..., None]
+        starts += np.linalg.solve(normal + 1e-9 * _scale(normal), right)[..., 0].T
+    return starts
 
 
 def _by_start(vector: Array, starts: Array, windows: Windows, numbers: int) -> tuple[np.ndarray, np.ndarray]:

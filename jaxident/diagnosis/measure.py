@@ -4,11 +4,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxident.diagnosis.gap import Floor, Shrink, errors, floor_of, shrink_of
-from jaxident.diagnosis.noise import Law
+from jaxident.diagnosis.gap import Floor, Shrink, errors, floor_of, settle, shrink_of
+from jaxident.diagnosis.linear import follow
+from jaxident.diagnosis.noise import Law, white_whitener
 from jaxident.diagnosis.prepare import BURN, Prepared, first_starts
 from jaxident.diagnosis.responses import respond
-from jaxident.diagnosis.search import Data, refit
 from jaxident.diagnosis.where import Place, locate
 from jaxident.diagnosis.which import Finding
 from jaxident.diagnosis.windows import Windows, cut
@@ -42,7 +42,7 @@ def measure(prepared: Prepared, finding: Finding, given, common, seed: int = 0) 
     base = finding.candidates.get(common, finding.candidates[()]).solution.vector
     told = base if given is None else np.concatenate([given, finding.nominal.vector[len(given) :]])
     vectors = np.stack([told, base, best.vector, *(c.solution.vector for c in singles.values())])
-    responses, residual, starts = _settle(best.vector, windows, law)
+    responses, residual, starts = _settled(best.vector, windows, law)
     found = errors(vectors, np.tile(starts, (len(vectors), 1, 1)), windows, law, responses, BURN)
     replay = floor_of(best.vector, residual, windows, law, responses, BURN, seed)
     mean = np.nanmean(found, axis=(1, 2))
@@ -93,12 +93,10 @@ def pick(windows: Windows, chosen, count: int) -> Windows:
                             run=windows.run[filled], first=windows.first[filled])  # fmt: skip
 
 
-def _settle(vector, windows: Windows, law: Law):
-    """Responses, residuals and starts of windows under a model, start states from all their rows."""
-    starts = first_starts(windows)
-    seen = np.repeat(np.asarray(windows.seen).T, 3, axis=1)
-    scale = np.tile(1.0 / np.array([law.position, law.position, law.heading]), len(windows.step))
-    data = Data(windows, np.eye(len(scale)) * scale * seen[:, :, None], np.ones(windows.step.shape[1], bool))
-    solution = refit(data, vector, starts, (), most=3)
-    responses = respond(np.exp(vector[:2]), solution.linear.residual, windows)
-    return responses, solution.linear.residual, solution.starts
+def _settled(vector, windows: Windows, law: Law):
+    """Responses, residuals and starts of windows under a model, start states from all their rows; its parameters stay,
+    for these windows serve no fit."""
+    white = white_whitener(law, windows)
+    starts = settle(vector, first_starts(windows), windows, white**2)
+    residual = follow(vector[None], starts[None], windows)[0]
+    return respond(np.exp(vector[:2]), residual, windows), residual, starts

@@ -67,6 +67,13 @@ def whitener_of(law: Law, windows: Windows, responses: Responses) -> np.ndarray:
     return factor * _numbers_seen(windows)[:, :, None]
 
 
+def white_whitener(law: Law, windows: Windows) -> np.ndarray:
+    """The whitener (windows, numbers, numbers) of white camera noise alone; diagonal."""
+    seen = _numbers_seen(windows)
+    scale = np.tile(1.0 / np.array([law.position, law.position, law.heading]), len(windows.step))
+    return np.eye(len(scale)) * scale * seen[:, :, None]
+
+
 def size_noise(residual: Array, starts: Array, windows: Windows, responses: Responses, use: Array) -> Law:
     """The likeliest law: white, with slip, with a camera memory, each only where it is worth its terms; from residuals
     (windows, numbers) and derivatives by start states (windows, numbers, 5) of the windows in `use` (boolean)."""

@@ -20,14 +20,6 @@ from jaxident.numerics import hold_integrals, sin_cos, wrap
 from jaxident.robot.drive import Physical
 
 
-class Extra(NamedTuple):
-    """What a corrector adds per row: acceleration along [m/s^2] and in heading [rad/s^2], speed to the left [m/s]."""
-
-    along: Any
-    heading: Any
-    left: Any
-
-
 class Track(NamedTuple):
     """True states of windows, each (rows, windows)."""
 
@@ -66,11 +58,11 @@ def report(settings, states: Track) -> Pose:
     return camera.camera_scale(pose, **settings["camera_scale"])
 
 
-def track(vector: Array, starts: Array, windows: Windows, extra: Extra | None = None) -> Track:
-    """True states (rows, windows) from starts (5, windows); `extra` per row, each (rows, windows)."""
+def track(vector: Array, starts: Array, windows: Windows) -> Track:
+    """True states (rows, windows) from starts (5, windows)."""
     settings = by_effect(vector)
     push = pushes(settings, vector[6:8], windows.t, windows.session, windows.command)
-    return move(vector, settings, in_windows(push, windows), starts, windows, extra)
+    return move(vector, settings, in_windows(push, windows), starts, windows)
 
 
 def in_windows(push: Push, windows: Windows) -> Push:
@@ -80,7 +72,7 @@ def in_windows(push: Push, windows: Windows) -> Push:
     return Push(*(part[places, windows.run].transpose(0, 2, 3, 1) for part in push))
 
 
-def move(vector: Array, settings, push: Push, starts: Array, windows: Windows, extra: Extra | None = None) -> Track:
+def move(vector: Array, settings, push: Push, starts: Array, windows: Windows) -> Track:
     """True states (rows, windows) under pushes (rows, substeps, 2, windows)."""
     drive = Physical(jnp.exp(vector[:2]), ((vector[2], vector[3]), (vector[4], vector[5])), vector[8:10])
     part = windows.step / SUBSTEPS
@@ -90,26 +82,25 @@ def move(vector: Array, settings, push: Push, starts: Array, windows: Windows, e
     loss, instant = settings["payload_change"]["loss"], settings["payload_change"]["instant"]
 
     def body(state, row):
-        mean, slope, part, lags, begin, added = row
+        mean, slope, part, lags, begin = row
         after = state
         for number in range(SUBSTEPS):
             middle = begin + (number + 0.5) * part
             lightness = 1.0 - loss * jax.nn.sigmoid((middle - instant) / part)
-            after = _substep(settings, drive, after, (mean[number], slope[number]), part, lags, lightness, added)
+            after = _substep(settings, drive, after, (mean[number], slope[number]), part, lags, lightness)
         return after, state
 
-    added = Extra(*[jnp.zeros_like(part)] * 3) if extra is None else extra
-    return Track(*jax.lax.scan(body, tuple(starts), (push.mean, push.slope, part, lags, begin, added))[1])
+    return Track(*jax.lax.scan(body, tuple(starts), (push.mean, push.slope, part, lags, begin))[1])
 
 
-def _substep(settings, drive: Physical, state, push, part: Array, lags, lightness: Array, added: Extra):
+def _substep(settings, drive: Physical, state, push, part: Array, lags, lightness: Array):
     """The state one substep later."""
     x, y, theta, v, w = state
     (mean, slope), (lag_v, lag_w) = push, lags
     pull, ramp = _force(drive, mean), _force(drive, slope)
-    first = _added(settings, drive, (theta, v, w), pull, ramp, -0.5, lightness, added)
+    first = _added(settings, drive, (theta, v, w), pull, ramp, -0.5, lightness)
     middle = _ahead(state, lag_v.half, lag_w.half, [f + n for f, n in zip(pull, first, strict=True)], 0.5 * part, None)
-    more = _added(settings, drive, middle, pull, ramp, 0.0, lightness, added)
+    more = _added(settings, drive, middle, pull, ramp, 0.0, lightness)
     pull = [f + n for f, n in zip(pull, more, strict=True)]
     _, free_v, free_w = _ahead(state, lag_v.whole, lag_w.whole, pull, part, ramp)
     rub = _friction(settings, drive, (v, w), (free_v, free_w), lags, lightness)
@@ -120,7 +111,7 @@ def _substep(settings, drive: Physical, state, push, part: Array, lags, lightnes
     x_rate, y_rate = 0.0, 0.0
     for weight, (angle, speed, turning) in ((1.0, (theta, v, w)), (4.0, middle), (1.0, end)):
         sine, cosine = sin_cos(angle)
-        left = lateral_slip(speed, turning, slip) + added.left
+        left = lateral_slip(speed, turning, slip)
         x_rate = x_rate + weight * (speed * cosine - left * sine)
         y_rate = y_rate + weight * (speed * sine + left * cosine)
     return x + part / 6.0 * x_rate, y + part / 6.0 * y_rate, *end
@@ -143,7 +134,7 @@ def _ahead(state, lag_v, lag_w, pull, time: Array, ramp):
     return turned - ramp[1] * time**2 / 12.0, faster, turning + ramp[1] * (twice_w / time - 0.5 * once_w)
 
 
-def _added(settings, drive: Physical, now, pull, ramp, place: float, lightness: Array, extra: Extra) -> list[Array]:
+def _added(settings, drive: Physical, now, pull, ramp, place: float, lightness: Array) -> list[Array]:
     """Accelerations by effects, dry friction left out."""
     theta, v, w = now
     across = drive.coupling[0] * w, drive.coupling[1] * v
@@ -162,13 +153,8 @@ def _added(settings, drive: Physical, now, pull, ramp, place: float, lightness: 
     sine, cosine = sin_cos(theta)
     incline = settings["slope"]["x"] * cosine + settings["slope"]["y"] * sine
     return [
-        across[0]
-        + extra.along
-        + sum(t.along for t in terms)
-        + incline
-        + lightness * lost[0]
-        + (lightness - 1.0) * along,
-        across[1] + extra.heading + sum(t.heading for t in terms) + lightness * lost[1] + (lightness - 1.0) * heading,
+        across[0] + sum(t.along for t in terms) + incline + lightness * lost[0] + (lightness - 1.0) * along,
+        across[1] + sum(t.heading for t in terms) + lightness * lost[1] + (lightness - 1.0) * heading,
     ]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.diagnosis.coordinates import neutral_vector, nominal_vector
 from jaxident.diagnosis.linear import START_STATES
-from jaxident.diagnosis.noise import Law, first_law, size_noise
+from jaxident.diagnosis.noise import Law, first_law, size_noise, white_whitener
 from jaxident.diagnosis.responses import respond
 from jaxident.diagnosis.search import Data, Solution, refit
 from jaxident.diagnosis.windows import Windows, cut
@@ -69,10 +69,13 @@ def prepare(
     period = float(np.median(np.concatenate([np.diff(run.t) for run in log.runs()])))
     rows, horizon = horizon_rows(horizon, period)
     windows = cut(log, BURN + rows)
-    if windows.step.shape[1] < 2:
-        raise InputError(f"{len(log.t)} rows: too few for windows of {BURN + rows} rows; record longer runs")
-    vector = neutral_vector(starting_point(log) if nominal is None else nominal)
     naming = roles(windows)
+    if not naming.any() or naming.all():
+        raise InputError(
+            f"{len(log.t)} rows make {len(naming)} windows of {BURN + rows} rows: too few to name and to judge; "
+            "record longer runs, or three of them"
+        )
+    vector = neutral_vector(starting_point(log) if nominal is None else nominal)
     first = rough_fit(windows, naming, vector, law)
     if law is not None:
         return Prepared(log, largest, windows, naming, horizon, Frames(frozen, frozen), first, law)
@@ -114,10 +117,7 @@ def starting_point(log: Log) -> np.ndarray:
 def rough_fit(windows: Windows, naming: Array, vector: Array, law: Law | None = None) -> Solution:
     """The nominal fit for white camera noise, of a law or as fourth differences size it."""
     law = first_law(windows) if law is None else law
-    seen = np.repeat(np.asarray(windows.seen).T, 3, axis=1)
-    scale = np.tile(1.0 / np.array([law.position, law.position, law.heading]), len(windows.step))
-    white = np.eye(len(scale)) * scale * seen[:, :, None]
-    return refit(Data(windows, white, naming), vector, first_starts(windows), (), most=6)
+    return refit(Data(windows, white_whitener(law, windows), naming), vector, first_starts(windows), (), most=6)
 
 
 def first_starts(windows: Windows) -> np.ndarray:

@@ -12,7 +12,7 @@ from jaxident.diagnosis.coordinates import (
     from_catalogue,
     unit_factors,
 )
-from jaxident.diagnosis.linear import explained, follow, gram, linearise, normal
+from jaxident.diagnosis.linear import explained, follow, gram, left_over, linearise
 from jaxident.diagnosis.search import Data, Solution
 from jaxident.diagnosis.windows import Windows
 from jaxident.effects.catalogue import CATALOGUE
@@ -123,12 +123,5 @@ def visible(data: Data, nominal: Solution, largest: float, duration: float) -> d
     columns = np.concatenate([nominal.linear.slopes, change], axis=2)[data.use]
     products = gram(data.whitener[data.use], columns, nominal.linear.starts[data.use]).products.sum(axis=0)
     base = list(range(len(nominal.places)))
-    return {name: _alone(products, base, len(base) + k) for k, name in enumerate(COORDINATES)}
-
-
-def _alone(products: Array, base: list[int], column: int) -> float:
-    """Half the squares of a column that others do not explain."""
-    order = [*base, column]
-    own = products[np.ix_(order, order)]
-    matrix, right, _ = normal(own, base)
-    return max(0.5 * float(own[-1, -1] - right @ np.linalg.solve(matrix, right)), 0.0)
+    orders = {name: [*base, len(base) + k] for k, name in enumerate(COORDINATES)}
+    return {name: max(left_over(products[np.ix_(order, order)], base), 0.0) for name, order in orders.items()}

@@ -21,7 +21,8 @@ best leaves."""
 PENALTY = 4.0
 """Fall of -log p that each coordinate of an effect costs."""
 ENOUGH = 9.0
-"""Gain beyond the penalty that claims an effect: one in ten thousand for a single one, a few in a thousand of all."""
+"""Gain beyond the penalty that claims an effect. With it a coordinate that does nothing gains as much once in three
+million times (chi-squared at 26), if the noise law is right; the rest is room for a law that is not quite."""
 MOST_EFFECTS = 3
 
 
@@ -40,16 +41,14 @@ class Candidate(NamedTuple):
 
 class Finding(NamedTuple):
     """Where the search ended: data under the final noise law, the nominal fit, all candidates of every stage by their
-    effects, the selected set, terms of the corrector with what each still explains, and their columns' products."""
+    effects, the selected set, and terms of the corrector with what each still explains."""
 
     data: Data
     law: Law
-    responses: Responses
     nominal: Solution
     candidates: dict[tuple[str, ...], Candidate]
     selected: tuple[str, ...]
     terms: list[tuple[Any, float]]
-    scores: dict[str, float]
 
 
 def search_effects(windows: Windows, use: Array, nominal: Solution, law: Law, *, sized: bool = True) -> Finding:
@@ -72,9 +71,7 @@ def search_effects(windows: Windows, use: Array, nominal: Solution, law: Law, *,
     selected = _grow(found, data)
     solution = found[selected].solution
     again = resized(solution, data, responses, again, sized)
-    return Finding(
-        data, again, responses, found[()].solution, found, selected, remaining(data, solution, responses), scores
-    )
+    return Finding(data, again, found[()].solution, found, selected, remaining(data, solution, responses))
 
 
 def resized(solution: Solution, data: Data, responses: Responses, law: Law, sized: bool) -> Law:

@@ -8,6 +8,9 @@ from jaxident.array_types import Array
 from jaxident.estimation.runs import stack_runs
 from jaxident.log import Log
 
+SMALLEST = 8
+"""Poses that a window needs: fewer say nothing beyond its start state."""
+
 
 class Windows(NamedTuple):
     """Runs cut into windows; time first, windows last.
@@ -66,7 +69,3 @@ def uncut(commands: Array, period: float) -> Windows:
         t=t, session=np.zeros(count), command=np.asarray(commands).transpose(1, 0, 2), step=np.full(t.shape, period),
         pose=np.zeros((*t.shape, 3)), seen=np.ones(t.shape, bool), run=np.arange(count), first=np.zeros(count, int),
     )  # fmt: skip
-
-
-SMALLEST = 8
-"""Poses that a window needs: fewer say nothing beyond its start state."""

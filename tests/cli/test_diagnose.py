@@ -29,11 +29,26 @@ def test_a_robot_that_stands_is_refused(tmp_path):
     write_log(make_log(t, rng.normal(size=200), rng.normal(size=200), *(1e-3 * rng.normal(size=(3, 200)))),
               tmp_path / "log.csv")  # fmt: skip
     assert "nothing moves" in refused(str(tmp_path / "log.csv"), "--out", str(tmp_path / "out"))
-    assert not (tmp_path / "out").exists()
+    assert not any((tmp_path / "out").iterdir())
 
 
-def test_missing_files_and_models_are_refused(tmp_path):
+def test_missing_files_and_short_runs_are_refused(tmp_path):
     assert "nowhere.csv" in refused(str(tmp_path / "nowhere.csv"))
+    t = np.arange(60) * 0.05
+    u = np.sign(np.sin(t))
+    short = make_log(t, u, 0.5 * u, np.cumsum(0.01 * u), 0.0 * t, np.cumsum(0.005 * u))
+    write_log(short, tmp_path / "short.csv")
+    assert "too few to name and to judge" in refused(str(tmp_path / "short.csv"), "--out", str(tmp_path / "out"))
+
+
+def test_sim_takes_all_words_up_to_the_next_option():
+    words = ["real_1.csv", "real_2.csv", "--sim", "sim_1.csv", "sim_2.csv", "--out", "found"]
+    given = command.make_context("diagnose", words).params
+    assert given["logs"] == ("real_1.csv", "real_2.csv")
+    assert given["sim"] == ("sim_1.csv", "sim_2.csv")
+    assert given["out"] == "found"
+    again = command.make_context("diagnose", ["real_1.csv", "--sim", "a.csv", "--sim", "b.csv"]).params
+    assert again["sim"] == ("a.csv", "b.csv")
 
 
 @pytest.mark.slow

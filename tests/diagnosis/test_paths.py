@@ -26,10 +26,10 @@ DRIVE = Physical(np.array([4.0, 5.0]), np.array([[1.2, 1.1], [9.0, -8.5]]), np.a
 DEAD_ZONE = np.array([0.1, 0.12])
 TOLERANCE = {
     "stiction": 0.1,
-    "traction_limit": 0.05,
+    "traction_limit": 0.02,
     "transport_delay": 0.02,
     "motor_lag": 0.02,
-    "payload_change": 0.05,
+    "payload_change": 0.02,
 }
 """Largest error as a part of what the effect does; 0.01 for the others."""
 
