@@ -21,6 +21,11 @@ from jaxident.effects.actuation import (
 from jaxident.effects.time import dead_zone_drift, gain_drift
 from jaxident.numerics import safe_divide
 
+PUSHING = (
+    "asymmetric_dead_zone", "direction_gain", "input_saturation", "input_quantisation", "input_rate_limit",
+    "transport_delay", "motor_lag", "backlash", "supply_sag", "gain_drift", "dead_zone_drift",
+)  # fmt: skip
+"""Effects that act before the wheels: beside the dead zones, pushes depend on nothing else."""
 SUBSTEPS = 2
 """Per row; the nominal part is exact whatever their number."""
 NODES = (0.21132486540518713, 0.7886751345948129)

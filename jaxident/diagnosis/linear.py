@@ -8,17 +8,17 @@ derivative would say nothing, and compile in a fraction of the time.
 from typing import Any, NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.coordinates import limits, sizes
-from jaxident.diagnosis.paths import residuals
+from jaxident.diagnosis.coordinates import PLACES, limits, sizes
+from jaxident.diagnosis.inputs import PUSHING
+from jaxident.diagnosis.paths import push_of, residuals
 from jaxident.diagnosis.responses import answer_to_start
 from jaxident.diagnosis.windows import Windows
 
 START_STATES = 5
-LANES = 8
-"""Vectors that the compiled program follows at once: few enough for the cache, one shape for every question."""
 PART = 1e-5
 """Of a coordinate's size: the step of a difference."""
 
@@ -40,21 +40,22 @@ class Gram(NamedTuple):
     solve: Any
 
 
-_followed = jax.jit(jax.vmap(residuals, in_axes=(0, 0, None)))
+_pushed, _moved = jax.jit(push_of), jax.jit(residuals)
+_PUSHING = [6, 7, *(place for (name, _), place in PLACES.items() if name in PUSHING)]
 
 
 def follow(vectors: Array, starts: Array, windows: Windows) -> np.ndarray:
-    """Residuals (batch, windows, numbers) at vectors (batch, SIZE) and starts (batch, 5, windows)."""
-    count = len(vectors)
-    short = -count % LANES
-    vectors = np.concatenate([vectors, np.repeat(vectors[-1:], short, axis=0)])
-    starts = np.concatenate([starts, np.repeat(starts[-1:], short, axis=0)])
-    found = [
-        np.asarray(_followed(vectors[k : k + LANES], starts[k : k + LANES], windows))
-        for k in range(0, len(vectors), LANES)
-    ]
-    whole = np.concatenate(found)[:count]
-    return whole.transpose(0, 2, 1, 3).reshape(count, whole.shape[2], -1)
+    """Residuals (batch, windows, numbers) at vectors (batch, SIZE) and starts (batch, 5, windows).
+
+    One vector after the other: more lanes of one program run no faster, and vectors that drive the wheels alike, as
+    most columns of a linearisation do, share what costs most.
+    """
+    windows = jax.tree.map(jnp.asarray, windows)
+    _, first, own = np.unique(vectors[:, _PUSHING], axis=0, return_index=True, return_inverse=True)
+    push = [_pushed(vectors[k], windows) for k in first]
+    found = [_moved(*pair, push[k], windows) for *pair, k in zip(vectors, starts, own.ravel(), strict=True)]
+    whole = np.stack([np.asarray(one) for one in found])
+    return whole.transpose(0, 2, 1, 3).reshape(len(whole), whole.shape[2], -1)
 
 
 def linearise(vector: Array, starts: Array, windows: Windows, places: list[int]) -> Linear:

@@ -37,9 +37,11 @@ class Lag(NamedTuple):
     whole: Any
 
 
-def residuals(vector: Array, starts: Array, windows: Windows) -> Array:
-    """Measured minus modelled poses (rows, windows, 3), 0 where unseen; starts (5, windows) of the robot itself."""
-    return compare(report(by_effect(vector), track(vector, starts, windows)), windows)
+def residuals(vector: Array, starts: Array, push: Push, windows: Windows) -> Array:
+    """Measured minus modelled poses (rows, windows, 3), 0 where unseen; starts (5, windows) of the robot itself, and
+    what `push_of` says drives its wheels."""
+    settings = by_effect(vector)
+    return compare(report(settings, move(vector, settings, push, starts, windows)), windows)
 
 
 def compare(pose: Pose, windows: Windows) -> Array:
@@ -60,13 +62,12 @@ def report(settings, states: Track) -> Pose:
 
 def track(vector: Array, starts: Array, windows: Windows) -> Track:
     """True states (rows, windows) from starts (5, windows)."""
-    settings = by_effect(vector)
-    push = pushes(settings, vector[6:8], windows.t, windows.session, windows.command)
-    return move(vector, settings, in_windows(push, windows), starts, windows)
+    return move(vector, by_effect(vector), push_of(vector, windows), starts, windows)
 
 
-def in_windows(push: Push, windows: Windows) -> Push:
-    """Pushes of runs cut into windows, (rows, substeps, 2, windows)."""
+def push_of(vector: Array, windows: Windows) -> Push:
+    """What drives the wheels: pushes of whole runs cut into windows, (rows, substeps, 2, windows)."""
+    push = pushes(by_effect(vector), vector[6:8], windows.t, windows.session, windows.command)
     rows = windows.step.shape[0]
     places = jnp.minimum(windows.first + jnp.arange(rows)[:, None], push.mean.shape[0] - 1)
     return Push(*(part[places, windows.run].transpose(0, 2, 3, 1) for part in push))

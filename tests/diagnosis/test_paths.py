@@ -13,7 +13,8 @@ from jaxident.diagnosis.coordinates import (
     neutral_vector,
     nominal_vector,
 )
-from jaxident.diagnosis.paths import report, residuals, track
+from jaxident.diagnosis.inputs import PUSHING
+from jaxident.diagnosis.paths import push_of, report, residuals, track
 from jaxident.diagnosis.windows import cut
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.simulate import simulate
@@ -88,8 +89,20 @@ def test_windows_start_where_they_are_told(log):
 
 def test_unseen_poses_leave_no_residual(log):
     hidden = log._replace(x=np.where(np.arange(ROWS) == 7, np.nan, log.x))
-    found = np.asarray(jax.jit(residuals)(nominal(), np.zeros((5, 1)), cut(hidden, ROWS)))
+    windows = cut(hidden, ROWS)
+    found = np.asarray(jax.jit(residuals)(nominal(), np.zeros((5, 1)), push_of(nominal(), windows), windows))
     assert np.all(found[7] == 0.0)
     assert np.all(np.isfinite(found))
     assert np.any(found[8] != 0.0)
     assert len(nominal()) == SIZE
+
+
+@pytest.mark.parametrize("name", COORDINATES)
+def test_effects_that_share_pushes_leave_them_as_they_are(log, name):
+    windows, vector = cut(log, ROWS), nominal()
+    typical = CATALOGUE[name].typical() | ({"instant": 2.0} if name == "payload_change" else {})
+    for key, value in from_catalogue(name, typical).items():
+        vector[PLACES[name, key]] = value
+    pushed = jax.jit(push_of)
+    same = jax.tree.map(np.array_equal, pushed(nominal(), windows), pushed(vector, windows))
+    assert all(same) == (name not in PUSHING)
