@@ -18,6 +18,8 @@ SAMPLE, ROWS = 60, 20
 """Windows from which noise is sized, spread evenly, and rows of each: slip is slow, and few rows show it."""
 SLIP_TIMES = (0.05, 0.2, 0.8)
 CAMERA_TIMES = (0.1, 0.5)
+HOPE = 5.0
+"""Times what its last step gained: what a search can still be expected to."""
 WORTH = 6.0
 """Gain of log-likelihood for which a term is believed: two variances and a correlation time."""
 
@@ -84,14 +86,18 @@ def size_noise(residual: Array, starts: Array, windows: Windows, responses: Resp
     every = np.arange(0, len(own.seen), max(1, len(own.seen) // ROWS))
     numbers = (3 * every[:, None] + np.arange(3)).ravel()
     given = residual[chosen][:, numbers], starts[chosen][:, numbers], own, part, numbers
-    best = _size(given, first_law(windows), None, None)
-    slip = max((_size(given, best.law, time, None) for time in SLIP_TIMES), key=lambda s: s.log_likelihood)
-    memory = max((_size(given, best.law, None, time) for time in CAMERA_TIMES), key=lambda s: s.log_likelihood)
-    first = max((slip, memory), key=lambda s: s.log_likelihood)
+    begin = first_law(windows)
+    best = first = _size(given, begin, None, None)
+    slips, memories = [(time, None) for time in SLIP_TIMES], [(None, time) for time in CAMERA_TIMES]
+    found = {}
+    for structure in (*slips, *memories):
+        found[structure] = _size(given, begin, *structure, rival=first.log_likelihood)
+        first = max((first, found[structure]), key=lambda s: s.log_likelihood)
+    slip, memory = (max((found[s] for s in kind), key=lambda s: s.log_likelihood) for kind in (slips, memories))
     if first.log_likelihood < best.log_likelihood + WORTH:
         return best.law
     slip_time, memory_time = slip.law.slip_time, memory.law.coloured_time
-    both = _size(given, best.law, slip_time, memory_time)
+    both = _size(given, begin, slip_time, memory_time, rival=first.log_likelihood + WORTH)
     return both.law if both.log_likelihood > first.log_likelihood + WORTH else first.law
 
 
@@ -103,14 +109,14 @@ def take(windows: Windows, chosen: Array) -> Windows:
     )  # fmt: skip
 
 
-def _size(given, begin: Law, slip_time: float | None, coloured_time: float | None) -> Sized:
-    """The best variances of one structure."""
+def _size(given, begin: Law, slip_time: float | None, coloured_time: float | None, rival: float = -np.inf) -> Sized:
+    """The best variances of one structure, or poorer ones if it is far from beating a rival's log-likelihood."""
     residual, starts, windows, responses, numbers = given
     parts = _parts(slip_time, coloured_time, windows, responses, numbers)
     size = [begin.position**2, begin.heading**2]
-    for part in parts[2:]:  # a hundredth of the camera's variance at the poses
-        size.append(0.01 * begin.position**2 / max(float(np.mean(np.diagonal(part, axis1=1, axis2=2))), 1e-300))
-    theta, value = _search(residual, starts, parts, np.array(size), _alone(windows, numbers))
+    for part in parts[2:]:  # as much as the camera's variance at the poses
+        size.append(begin.position**2 / max(float(np.mean(np.diagonal(part, axis1=1, axis2=2))), 1e-300))
+    theta, value = _search(residual, starts, parts, np.array(size), _alone(windows, numbers), rival)
     sd = np.sqrt(theta)
     slip = (float(sd[2]), float(sd[3])) if slip_time is not None else None
     coloured = (float(sd[-2]), float(sd[-1])) if coloured_time is not None else None
@@ -152,8 +158,8 @@ def _alone(windows: Windows, numbers=slice(None)) -> np.ndarray:
     return unseen[:, :, None] * np.eye(unseen.shape[1])
 
 
-def _search(residual: Array, starts: Array, parts, theta: Array, alone: Array) -> tuple[np.ndarray, float]:
-    """Variances of the highest restricted likelihood, and that likelihood."""
+def _search(residual: Array, starts: Array, parts, theta: Array, alone: Array, rival: float):
+    """Variances of the highest restricted likelihood, and that likelihood; without hope against a rival it stops."""
     damping, best, value, slope, curve = 1e-3, theta, -np.inf, None, None
     proposed = theta
     for _ in range(MOST_STEPS):
@@ -161,23 +167,21 @@ def _search(residual: Array, starts: Array, parts, theta: Array, alone: Array) -
         gained = found[0] - value
         if gained >= 0.0 or slope is None:
             best, (value, slope, curve), damping = proposed, found, 0.3 * damping
-            if 0.0 <= gained < 0.02:
+            if 0.0 <= gained < 0.02 or value + HOPE * gained < rival:
                 break
         else:
             damping *= 10.0
         # in logarithms of the variances
         gradient, matrix = best * slope, best[:, None] * curve * best
         matrix = matrix + (damping + 1e-9) * np.diag(np.diagonal(matrix) + 1e-3)
-        proposed = best * np.exp(np.clip(np.linalg.solve(matrix, gradient), -3.0, 2.0))
+        proposed = best * np.exp(np.clip(np.linalg.solve(matrix, gradient), -3.0, 3.0))
     return best, float(value)
 
 
 def _likelihood(residual: Array, starts: Array, parts, theta: Array, alone: Array):
     """Restricted log-likelihood, its gradient and average information in the variances."""
     total = sum(t * part for t, part in zip(theta, parts, strict=True)) + alone
-    factor = np.linalg.cholesky(total)
-    inverse = np.linalg.inv(factor)
-    inverse = inverse.transpose(0, 2, 1) @ inverse
+    inverse = np.linalg.inv(total)
     weighted = inverse @ starts
     information = starts.transpose(0, 2, 1) @ weighted
     scale = np.sqrt(np.diagonal(information, axis1=1, axis2=2))[:, :, None]
@@ -189,6 +193,5 @@ def _likelihood(residual: Array, starts: Array, parts, theta: Array, alone: Arra
     back = (inverse @ moved[..., None])[..., 0]
     slope = np.array([0.5 * (np.sum(m * taken) - np.sum(inverse * part)) for m, part in zip(moved, parts, strict=True)])
     curve = 0.5 * np.einsum("iwa,jwa->ij", moved, back)
-    determinant = 2.0 * np.sum(np.log(np.diagonal(factor, axis1=1, axis2=2)))
-    determinant += np.sum(np.linalg.slogdet(information)[1]) + 2.0 * np.sum(np.log(scale))
+    determinant = np.sum(np.linalg.slogdet(total)[1]) + np.sum(np.linalg.slogdet(information)[1]) + 2.0 * np.sum(np.log(scale))
     return -0.5 * (determinant + np.sum(residual * taken)), slope, curve
