@@ -15,6 +15,8 @@ from jaxident.diagnosis.responses import Responses, modelled_path
 from jaxident.diagnosis.windows import Windows
 
 LAGS = (1, 2, 4, 8)
+MEMORIES = (2.0, 8.0)
+"""Time constants [s] of what forgets slowly."""
 MOST_TERMS = 6
 WORTH = 9.0
 """Fall of -log p that a term must bring: one of a hundred does so by chance once in 450 times (chi-squared at 18)."""
@@ -74,6 +76,8 @@ def _forces(windows: Windows, v, w, theta, x, y, time) -> dict[tuple[str, str], 
         return found.transpose(1, 0, 2)
 
     u = commanded(0)
+    worked = {seconds: _recent(np.abs(windows.command), windows.t, seconds) for seconds in MEMORIES}
+    tired = {seconds: mean[places, windows.run].transpose(1, 0, 2) for seconds, mean in worked.items()}
     terms: dict[tuple[str, str], Any] = {}
     for wheel, side in enumerate(("right", "left")):
         own, other = u[..., wheel], u[..., 1 - wheel]
@@ -84,6 +88,8 @@ def _forces(windows: Windows, v, w, theta, x, y, time) -> dict[tuple[str, str], 
         for lag in LAGS:
             terms["actuation", f"u {lag} rows ago {side}"] = commanded(lag)[..., wheel] - own
         terms["time", f"time u {side}"] = time * own
+        for seconds, smooth in tired.items():
+            terms["actuation", f"u (mean |u| of {seconds:g} s) {side}"] = own * smooth[..., wheel]
     pairs = {"v |v|": v * np.abs(v), "w |w|": w * np.abs(w), "v w": v * w, "v^2": v * v, "w^2": w * w,
              "|w| v": np.abs(w) * v, "|v| w": np.abs(v) * w, "sign v": np.sign(v), "sign w": np.sign(w),
              "|v|": np.abs(v), "|w|": np.abs(w), "v^3": v**3, "w^3": w**3}  # fmt: skip
@@ -93,6 +99,15 @@ def _forces(windows: Windows, v, w, theta, x, y, time) -> dict[tuple[str, str], 
     terms |= {("contact", "cos 2"): np.cos(2 * theta), ("contact", "sin 2"): np.sin(2 * theta)}
     terms |= {("time", "time"): time, ("time", "time v"): time * v, ("time", "time w"): time * w}
     return terms
+
+
+def _recent(values: Array, t: Array, seconds: float) -> np.ndarray:
+    """Mean (rows, runs, ...) of earlier values, forgotten over some seconds; t (rows, runs)."""
+    kept = np.exp(-np.diff(t, axis=0) / seconds)
+    found = np.zeros_like(values)
+    for row, own in enumerate(kept):
+        found[row + 1] = own[:, None] * found[row] + (1.0 - own[:, None]) * values[row]
+    return found
 
 
 def _camera(x, y, theta, v, w, time) -> dict[str, np.ndarray]:

@@ -193,5 +193,6 @@ def _likelihood(residual: Array, starts: Array, parts, theta: Array, alone: Arra
     back = (inverse @ moved[..., None])[..., 0]
     slope = np.array([0.5 * (np.sum(m * taken) - np.sum(inverse * part)) for m, part in zip(moved, parts, strict=True)])
     curve = 0.5 * np.einsum("iwa,jwa->ij", moved, back)
-    determinant = np.sum(np.linalg.slogdet(total)[1]) + np.sum(np.linalg.slogdet(information)[1]) + 2.0 * np.sum(np.log(scale))
+    determinant = sum(np.sum(np.linalg.slogdet(matrix)[1]) for matrix in (total, information))
+    determinant += 2.0 * np.sum(np.log(scale))
     return -0.5 * (determinant + np.sum(residual * taken)), slope, curve

@@ -14,22 +14,26 @@ from jaxident.diagnosis.coordinates import (
 )
 from jaxident.diagnosis.linear import explained, follow, gram, left_over, linearise
 from jaxident.diagnosis.search import Data, Solution
-from jaxident.diagnosis.windows import Windows
+from jaxident.diagnosis.steps import likely_steps
 from jaxident.effects.catalogue import CATALOGUE
 
 
-def seeds(name: str, windows: Windows) -> list[dict[str, float]]:
+INSTANTS = (10.0, 1.2, 0.15)
+"""Reach [s] of each search for an instant about the best before."""
+
+
+def seeds(name: str, data: Data, solution: Solution) -> list[dict[str, float]]:
     """Points from which an effect without a derivative at neutral is looked for; one neutral point for the others."""
     if name == "input_saturation":
         return [{"level": level} for level in (0.9, 0.75, 0.6, 0.45, 0.3)]
     if name == "input_quantisation":
-        return [{"step": float(step)} for step in np.geomspace(0.02, 0.4, 96)]  # a sawtooth is lost a few % beside
+        return [{"step": float(step)} for step in likely_steps(data, solution)]
     if name == "input_rate_limit":
         return [{"inverse_rate": inverse} for inverse in (0.03, 0.07, 0.15, 0.3, 0.6)]
     if name == "stiction":
         return [{"right": s, "left": s, "fade": fade} for s, fade in ((0.05, 0.05), (0.15, 0.05), (0.1, 0.15))]
     if name == "payload_change":
-        last = float(windows.session[-1] + windows.t[-1, -1])
+        last = float(data.windows.session[-1] + data.windows.t[-1, -1])
         return [{"loss": 0.1, "instant": last * part} for part in np.linspace(0.06, 0.94, 12)]
     if name == "lens_distortion":
         return [{"strength": 0.01}]
@@ -53,7 +57,7 @@ def score(data: Data, solution: Solution) -> dict[str, float]:
     linear = linearise(solution.vector, solution.starts, data.windows, [*free, *more])
     jumps = [
         (name, seed) for name in COORDINATES if name not in SMOOTH and PLACES[_sizes_of(name)[0]] not in free
-        for seed in seeds(name, data.windows)
+        for seed in seeds(name, data, solution)
     ]  # fmt: skip
     change = _differences(data, solution, [seeded(solution.vector, *jump) for jump in jumps])
     columns = np.concatenate([linear.slopes, change, linear.residual[..., None]], axis=2)[data.use]
@@ -85,13 +89,13 @@ def _differences(data: Data, solution: Solution, vectors: list[np.ndarray]) -> n
 def beginnings(data: Data, solution: Solution, name: str) -> list[np.ndarray]:
     """Vectors from which to refit one more effect: neutral; or the seed that promises most, and one of middling size,
     for at a fit that a large effect has bent the promises mislead."""
-    points = seeds(name, data.windows)
+    points = seeds(name, data, solution)
     if name in SMOOTH or len(points) == 1:
         return [seeded(solution.vector, name, points[0])]
     vectors, gains = _promises(data, solution, name, points)
     best = int(np.argmax(gains))
     if any((name, key) in STEPPED for key in points[best]):
-        near = [{key: v * part for key, v in points[best].items()} for part in np.linspace(0.97, 1.03, 16)]
+        near = [{key: v * part for key, v in points[best].items()} for part in np.linspace(0.99, 1.01, 15)]
         vectors, gains = _promises(data, solution, name, near)
         return [vectors[int(np.argmax(gains))]]
     middle = (3 * len(points)) // 5
@@ -106,6 +110,24 @@ def _promises(data: Data, solution: Solution, name: str, points) -> tuple[list[n
     products = gram(data.whitener[data.use], columns, solution.linear.starts[data.use]).products.sum(axis=0)
     base = list(range(len(solution.places)))
     return vectors, [explained(products, base, [len(base) + k]) for k in range(len(points))]
+
+
+def at_best_instant(data: Data, solution: Solution) -> np.ndarray:
+    """The vector of a solution with the payload's change where it fits best, all else following linearly: between two
+    poses -log p has as many valleys as there are windows."""
+    place, base = PLACES["payload_change", "instant"], len(solution.places)
+    best = np.array(solution.vector)
+    for span in INSTANTS:
+        vectors = np.tile(best, (17, 1))
+        vectors[:, place] += span * np.linspace(-1.0, 1.0, len(vectors))
+        lanes = np.broadcast_to(solution.starts, (len(vectors), *solution.starts.shape))
+        found = np.moveaxis(follow(vectors, lanes, data.windows), 0, -1)
+        columns = np.concatenate([solution.linear.slopes, found], axis=2)[data.use]
+        products = gram(data.whitener[data.use], columns, solution.linear.starts[data.use]).products.sum(axis=0)
+        orders = [[*range(base), base + k] for k in range(len(vectors))]
+        left = [left_over(products[np.ix_(order, order)], order[:-1]) for order in orders]
+        best = vectors[int(np.argmin(left))]
+    return best
 
 
 def visible(data: Data, nominal: Solution, largest: float, duration: float) -> dict[str, float]:

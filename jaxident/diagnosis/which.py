@@ -7,10 +7,10 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.diagnosis.coordinates import COORDINATES, SHAPES
 from jaxident.diagnosis.corrector import library, pursue
-from jaxident.diagnosis.linear import gram
-from jaxident.diagnosis.noise import Law, size_noise, whitener_of
+from jaxident.diagnosis.linear import gram, normal
+from jaxident.diagnosis.noise import Law, size_noise, white_whitener, whitener_of
 from jaxident.diagnosis.responses import Responses, respond
-from jaxident.diagnosis.scores import beginnings, score
+from jaxident.diagnosis.scores import at_best_instant, beginnings, score
 from jaxident.diagnosis.search import Data, Solution, refit
 from jaxident.diagnosis.windows import Windows
 from jaxident.effects.catalogue import CATALOGUE
@@ -71,7 +71,8 @@ def search_effects(windows: Windows, use: Array, nominal: Solution, law: Law, *,
     selected = _grow(found, data)
     solution = found[selected].solution
     again = resized(solution, data, responses, again, sized)
-    return Finding(data, again, found[()].solution, found, selected, remaining(data, solution, responses))
+    terms = remaining(data, solution, responses, again, sized)
+    return Finding(data, again, found[()].solution, found, selected, terms)
 
 
 def resized(solution: Solution, data: Data, responses: Responses, law: Law, sized: bool) -> Law:
@@ -116,6 +117,8 @@ def _refit_with_shapes(data: Data, vector: Array, starts: Array, effects: tuple[
     if shapes:
         first = refit(data, vector, starts, effects, shapes, most=4)
         vector, starts = first.vector, first.starts
+        if effects[-1] == "payload_change":
+            vector = at_best_instant(data, first)
     return refit(data, vector, starts, effects)
 
 
@@ -149,12 +152,31 @@ def _with_look_alikes(scores: dict[str, float]) -> list[str]:
     return list(dict.fromkeys([*best, *near]))
 
 
-def remaining(data: Data, solution: Solution, responses: Responses) -> list[tuple[Any, float]]:
-    """Terms of the corrector that a solution leaves room for, each with the fall of -log p that it brings."""
+def remaining(data: Data, solution: Solution, responses: Responses, law: Law, sized: bool) -> list[tuple[Any, float]]:
+    """Terms of the corrector that a solution leaves room for, each with the fall of -log p that it brings.
+
+    A law sized beside a gap takes the gap for slip or a memory of the camera. So terms are first chosen as if the
+    noise were white, the law is sized again at what they leave, and only then do they count.
+    """
     linear = solution.linear
     corrector = library(linear.residual, data.windows, responses)
-    columns = np.concatenate([linear.slopes, corrector.columns, linear.residual[..., None]], axis=2)[data.use]
-    products = gram(data.whitener[data.use], columns, linear.starts[data.use]).products.sum(axis=0)
+    columns = np.concatenate([linear.slopes, corrector.columns, linear.residual[..., None]], axis=2)
     base = list(range(len(solution.places)))
-    chosen = pursue(products, base, [len(base) + k for k in range(len(corrector.terms))])
-    return [(corrector.terms[place - len(base)], gain) for place, gain in chosen]
+    candidates = [len(base) + k for k in range(len(corrector.terms))]
+
+    def chosen(whitener: Array) -> tuple[list, np.ndarray]:
+        """Terms, and the residuals that they and the solution's own coordinates would leave."""
+        used = data.use
+        products = gram(whitener[used], columns[used], linear.starts[used]).products.sum(axis=0)
+        found = pursue(products, base, candidates)
+        free = [*base, *(place for place, _ in found)]
+        own, cross, scale = normal(products, free)
+        return found, linear.residual - columns[..., free] @ (np.linalg.solve(own, cross) / scale)
+
+    found, _ = chosen(data.whitener)
+    if sized and law != Law(law.position, law.heading):
+        _, left = chosen(white_whitener(law, data.windows))
+        again = size_noise(left, linear.starts, data.windows, responses, data.use)
+        others, _ = chosen(whitener_of(again, data.windows, responses))
+        found = max(found, others, key=lambda terms: sum(gain for _, gain in terms))
+    return [(corrector.terms[place - len(base)], gain) for place, gain in found]
