@@ -23,10 +23,12 @@ WORTH = 9.0
 
 
 class Term(NamedTuple):
-    """One column: the site whose effects look like it, and its name for people."""
+    """One column: the site whose effects look like it, its name for people, and the fall of -log p that looking for it
+    among many alike brings by chance."""
 
     site: str
     name: str
+    price: float = 0.0
 
 
 class Corrector(NamedTuple):
@@ -127,9 +129,9 @@ def _camera(x, y, theta, v, w, time) -> dict[str, np.ndarray]:
     return {name: np.stack(columns, axis=-1) for name, columns in found.items()}
 
 
-def pursue(products: Array, base: list[int], candidates: list[int]) -> list[tuple[int, float]]:
+def pursue(products: Array, base: list[int], candidates: list[int], prices: Array) -> list[tuple[int, float]]:
     """Candidates (columns of products, the residual last) in the order in which they explain most, each with the fall
-    of -log p that it brings, as long as it is worth it; `base` columns are free throughout."""
+    of -log p that it brings beyond its price, as long as it is worth it; `base` columns are free throughout."""
     own, cross, _ = normal(products, [*base, *candidates], ridge=1e-9)
     left = np.array(own)
     right = np.array(cross)
@@ -147,7 +149,7 @@ def pursue(products: Array, base: list[int], candidates: list[int]) -> list[tupl
     chosen: list[tuple[int, float]] = []
     for _ in range(MOST_TERMS):
         power = np.diagonal(left)[count:]
-        gains = np.where(power > 1e-6, 0.5 * right[count:] ** 2 / np.maximum(power, 1e-6), 0.0)
+        gains = np.where(power > 1e-6, 0.5 * right[count:] ** 2 / np.maximum(power, 1e-6), 0.0) - prices
         best = int(np.argmax(gains))
         if gains[best] < WORTH:
             break

@@ -8,7 +8,7 @@ from jaxident.diagnosis.direct import direct_effects, direct_evidence
 from jaxident.diagnosis.gap import Shrink
 from jaxident.diagnosis.measure import Gap, measure
 from jaxident.diagnosis.prepare import Prepared, prepare
-from jaxident.diagnosis.scores import visible
+from jaxident.diagnosis.replay import Replay, answers, replay, visible
 from jaxident.diagnosis.simulator import inspect_simulator, shared
 from jaxident.diagnosis.verdict import Judgement, judge
 from jaxident.diagnosis.where import Place
@@ -35,8 +35,8 @@ class Parameter(NamedTuple):
 
 class Diagnosis(NamedTuple):
     """What `diagnose` found. verdict: "no_gap", "parameters", "effects", "unknown" or "undecided". visible: the gain
-    that each effect of typical size would have had; below ENOUGH this input could not have shown it. surplus: effects
-    that the user's simulator has and the robot has not."""
+    that each effect of typical size would have had; below ENOUGH this input could not have shown it. replay: what faint
+    effects come out as. surplus: effects that the user's simulator has and the robot has not."""
 
     verdict: str
     judgement: Judgement
@@ -45,6 +45,7 @@ class Diagnosis(NamedTuple):
     selected: tuple[str, ...]
     parameters: list[Parameter]
     visible: dict[str, float]
+    replay: Replay
     next: str
     nominal_model: Model
     corrected_model: Model
@@ -85,19 +86,20 @@ def diagnose(
     told = given if simulator is None else simulator.vector
     extra = direct_evidence(prepared, finding)
     common, surplus = shared(finding, simulator)
-    judgement = judge(finding, extra, common)
     selected = tuple(name for name in finding.selected if name not in common)
     selected += tuple(name for name, evidence in extra.items() if evidence > ENOUGH)
     gap, where, shrinks = measure(prepared, finding, told, common, seed)
+    judgement = judge(finding, gap, extra, common)
     duration = float(prepared.windows.session[-1] + prepared.windows.t[-1, -1])
-    found = visible(finding.data, finding.nominal, prepared.largest, duration)
+    known = answers(finding.data, finding.nominal, prepared.largest, duration)
     parameters = compare_parameters(prepared, finding, told)
     verdict = decide(prepared, judgement, parameters)
     best, direct = finding.candidates[finding.selected].solution, direct_effects(prepared, finding, selected)
     corrected = translate.to_model(prepared, best, finding.law, finding.selected, direct)
     nominal = translate.to_model(prepared, finding.nominal, finding.law, ())
-    return Diagnosis(verdict, judgement, gap, where, selected if verdict == "effects" else (), parameters, found,
-                     advice(verdict, judgement), nominal, corrected, shrinks, prepared, finding, surplus)  # fmt: skip
+    return Diagnosis(verdict, judgement, gap, where, selected if verdict == "effects" else (), parameters,
+                     visible(known), replay(known, seed), advice(verdict, judgement), nominal, corrected, shrinks,
+                     prepared, finding, surplus)  # fmt: skip
 
 
 def compare_parameters(prepared: Prepared, finding: Finding, given) -> list[Parameter]:

@@ -76,13 +76,18 @@ def linearise(vector: Array, starts: Array, windows: Windows, places: list[int])
 
 def gram(whitener: Array, columns: Array, starts: Array) -> Gram:
     """Products of columns (windows, numbers, n) after a whitener (windows, numbers, numbers)."""
+    rest, solve = without_starts(whitener, columns, starts)
+    return Gram(rest.transpose(0, 2, 1) @ rest, solve)
+
+
+def without_starts(whitener: Array, columns: Array, starts: Array) -> tuple[np.ndarray, np.ndarray]:
+    """Whitened columns (windows, numbers, n) free of start states, and what these take of them (windows, 5, n)."""
     columns, starts = whitener @ columns, whitener @ starts
     scale = np.sqrt(np.sum(starts**2, axis=1, keepdims=True)) + 1e-300
     basis, upper = np.linalg.qr(starts / scale)
     upper = upper + 1e-9 * np.eye(START_STATES)
     taken = basis.transpose(0, 2, 1) @ columns
-    rest = columns - basis @ taken
-    return Gram(rest.transpose(0, 2, 1) @ rest, np.linalg.solve(upper, taken) / scale.transpose(0, 2, 1))
+    return columns - basis @ taken, np.linalg.solve(upper, taken) / scale.transpose(0, 2, 1)
 
 
 def explained(products: Array, base: list[int], more: list[int]) -> float:

@@ -9,14 +9,10 @@ from jaxident.diagnosis.coordinates import (
     SHAPES,
     SMOOTH,
     STEPPED,
-    from_catalogue,
-    unit_factors,
 )
 from jaxident.diagnosis.linear import explained, follow, gram, left_over, linearise
 from jaxident.diagnosis.search import Data, Solution
 from jaxident.diagnosis.steps import likely_steps
-from jaxident.effects.catalogue import CATALOGUE
-
 
 INSTANTS = (10.0, 1.2, 0.15)
 """Reach [s] of each search for an instant about the best before."""
@@ -128,22 +124,3 @@ def at_best_instant(data: Data, solution: Solution) -> np.ndarray:
         left = [left_over(products[np.ix_(order, order)], order[:-1]) for order in orders]
         best = vectors[int(np.argmin(left))]
     return best
-
-
-def visible(data: Data, nominal: Solution, largest: float, duration: float) -> dict[str, float]:
-    """The gain that each effect of the catalogue's typical size would have, nominal parameters refitted: what this
-    input can show. Commands are over `largest`; duration [s] of all runs."""
-    vectors = []
-    for name in COORDINATES:
-        typical = CATALOGUE[name].typical()
-        if name == "payload_change":
-            typical["instant"] = 0.5 * duration
-        factors = unit_factors(name, largest)
-        inner = {key: value / factors[key] for key, value in typical.items()}
-        vectors.append(seeded(nominal.vector, name, from_catalogue(name, inner)))
-    change = _differences(data, nominal, vectors)
-    columns = np.concatenate([nominal.linear.slopes, change], axis=2)[data.use]
-    products = gram(data.whitener[data.use], columns, nominal.linear.starts[data.use]).products.sum(axis=0)
-    base = list(range(len(nominal.places)))
-    orders = {name: [*base, len(base) + k] for k, name in enumerate(COORDINATES)}
-    return {name: max(left_over(products[np.ix_(order, order)], base), 0.0) for name, order in orders.items()}

@@ -7,7 +7,7 @@ to follow each. To first order a small force gains its product with the slope of
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.responses import respond
+from jaxident.diagnosis.responses import Responses, respond
 from jaxident.diagnosis.search import Data, Solution
 
 TEETH = np.arange(2.2, 50.0, 0.08)
@@ -33,14 +33,20 @@ def likely_steps(data: Data, solution: Solution, count: int = 16) -> np.ndarray:
 
 def _slopes(data: Data, solution: Solution) -> np.ndarray:
     """Fall of -log p by a unit more of each wheel's push in each row, (rows of a run, runs, 2)."""
-    windows, linear = data.windows, solution.linear
-    responses = respond(np.exp(solution.vector[:2]), linear.residual, windows)
-    pull = data.whitener.transpose(0, 2, 1) @ (data.whitener @ linear.residual[..., None])
-    pull = pull * np.asarray(data.use)[:, None, None]
-    along, heading = ((answer.transpose(0, 2, 1) @ pull)[..., 0] for answer in (responses.along, responses.heading))
+    windows = data.windows
+    responses = respond(np.exp(solution.vector[:2]), solution.linear.residual, windows)
+    along, heading = pulls(data, solution.linear.residual, responses)
     gain = solution.vector[2:6].reshape(2, 2)
     wanted = along[..., None] * gain[0] + heading[..., None] * gain[1]
     places = np.minimum(windows.first[:, None] + np.arange(wanted.shape[1]), len(windows.command) - 1)
     total = np.zeros(windows.command.shape)
     np.add.at(total, (places, np.broadcast_to(windows.run[:, None], places.shape)), wanted)
     return total
+
+
+def pulls(data: Data, residual: Array, responses: Responses) -> tuple[np.ndarray, np.ndarray]:
+    """Fall of -log p by a unit more acceleration along and in heading in each row of each window (windows, rows)."""
+    weighted = data.whitener.transpose(0, 2, 1) @ (data.whitener @ residual[..., None])
+    weighted = weighted * np.asarray(data.use)[:, None, None]
+    along, heading = ((answer.transpose(0, 2, 1) @ weighted)[..., 0] for answer in responses[:2])
+    return along, heading

@@ -4,6 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jaxident.diagnosis.gap import interval
+from jaxident.diagnosis.measure import Gap
 from jaxident.diagnosis.which import ENOUGH, Finding
 from jaxident.effects.catalogue import CATALOGUE, SITES
 
@@ -13,8 +15,17 @@ UNEXPLAINED, SIGNIFICANT = 0.2, 20.0
 """A gap is unknown where the corrector explains this share of it beyond the best set, and that much of -log p."""
 SHARPNESS = 0.04, 4.0
 """Width of both thresholds: how slowly probability passes from known to unknown."""
+EXCESS = 2.0
+"""A gap is unknown where the corrected model's error on runs that serve nothing else, at the low end of its interval,
+is this many times what noise could make it at most."""
+BELIEVABLE = 0.025
+"""Random slip beyond this part of full drive, at a correlation time of SLOW [s], is a cause nobody has found yet."""
+SLOW = 0.2
+WIDTH = 0.12
+"""Of both thresholds, as a logarithm."""
 ALIKE = 6.0
 """Effects whose evidence in place of another falls short of its by less than this cannot be told from it."""
+NOWHERE = {"actuation": 0.2, "drive": 0.4, "contact": 0.4, "time": 0.0, "camera": 0.0}
 
 
 class Cause(NamedTuple):
@@ -37,15 +48,15 @@ class Judgement(NamedTuple):
     sites: dict[str, float]
 
 
-def judge(finding: Finding, extra: dict[str, float], common: tuple[str, ...] = ()) -> Judgement:
-    """Probabilities from the candidates, from what the corrector still explains, and from effects found directly in the
+def judge(finding: Finding, gap: Gap, extra: dict[str, float], common: tuple[str, ...] = ()) -> Judgement:
+    """Probabilities from the candidates, from what they leave unexplained, and from effects found directly in the
     frames or in the noise law (`extra`: name to evidence). `common` effects are in the simulator already: no gap."""
     sure = tuple(name for name, evidence in extra.items() if evidence > ENOUGH)
     weights = {effects: (c.evidence - ENOUGH * len(effects)) / TEMPERATURE for effects, c in finding.candidates.items()}
     top = max(weights.values())
     total = sum(np.exp(value - top) for value in weights.values())
     chance = {effects: float(np.exp(value - top) / total) for effects, value in weights.items()}
-    unknown = unknown_probability(finding)
+    unknown = unknown_probability(finding, gap)
     known = 1.0 - unknown
     sets: dict[tuple[str, ...], float] = {}
     for effects, p in chance.items():
@@ -59,13 +70,31 @@ def judge(finding: Finding, extra: dict[str, float], common: tuple[str, ...] = (
     return Judgement(none, unknown, ordered, _causes(finding, ordered), _sites(finding, ordered, unknown))
 
 
-def unknown_probability(finding: Finding) -> float:
-    """How sure the corrector makes that something outside the selected set takes part."""
+def unknown_probability(finding: Finding, gap: Gap) -> float:
+    """How sure it is that something outside the selected set takes part: terms of the corrector explain more, runs that
+    served nothing else are predicted worse than noise allows, or more is called slip than wheels slip."""
     rest = sum(gain for _, gain in finding.terms)
     gained = finding.candidates[finding.selected].gain
     share = rest / max(gained + rest, 1e-9)
     large = _logistic((rest - SIGNIFICANT) / SHARPNESS[1])
-    return large * _logistic((share - UNEXPLAINED) / SHARPNESS[0])
+    explained = large * _logistic((share - UNEXPLAINED) / SHARPNESS[0])
+    excess = interval(gap.errors[2])[0] / max(gap.floor_interval[1], 1e-9)
+    beyond = (_beyond(excess, EXCESS), _beyond(slip_of_drive(finding), BELIEVABLE))
+    return 1.0 - (1.0 - explained) * (1.0 - beyond[0]) * (1.0 - beyond[1])
+
+
+def slip_of_drive(finding: Finding) -> float:
+    """Random slip as a part of full drive, the larger of along and in heading; slip of another correlation time counts
+    by its spectral density."""
+    law = finding.law
+    if law.slip is None or law.slip_time is None:
+        return 0.0
+    full = np.abs(finding.nominal.vector[2:6]).reshape(2, 2).sum(axis=1)
+    return float(np.max(np.array(law.slip) / full) * np.sqrt(law.slip_time / SLOW))
+
+
+def _beyond(value: float, threshold: float) -> float:
+    return _logistic(np.log(max(value, 1e-9) / threshold) / WIDTH)
 
 
 def _logistic(value: float) -> float:
@@ -97,11 +126,12 @@ def alike(finding: Finding, name: str) -> tuple[str, ...]:
 
 
 def _sites(finding: Finding, sets, unknown: float) -> dict[str, float]:
-    """Probability that each site takes part; an unknown cause lies where the corrector's terms do."""
-    rest = sum(gain for _, gain in finding.terms) or 1.0
+    """Probability that each site takes part; an unknown cause lies where the corrector's terms do, and without any
+    somewhere between motors and ground, as what cannot be told from slip does."""
+    rest = sum(gain for _, gain in finding.terms)
     found = {}
     for site in SITES:
         known = sum(p for effects, p in sets if any(CATALOGUE[name].site == site for name in effects))
-        lies = sum(gain for term, gain in finding.terms if term.site == site) / rest
+        lies = sum(gain for term, gain in finding.terms if term.site == site) / rest if rest else NOWHERE[site]
         found[site] = float(min(known + unknown * lies, 1.0))
     return found

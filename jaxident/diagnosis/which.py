@@ -6,10 +6,11 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.coordinates import COORDINATES, SHAPES
-from jaxident.diagnosis.corrector import library, pursue
+from jaxident.diagnosis.corrector import Term, library, pursue
 from jaxident.diagnosis.linear import gram, normal
 from jaxident.diagnosis.noise import Law, size_noise, white_whitener, whitener_of
 from jaxident.diagnosis.responses import Responses, respond
+from jaxident.diagnosis.rhythm import rhythms
 from jaxident.diagnosis.scores import at_best_instant, beginnings, score
 from jaxident.diagnosis.search import Data, Solution, refit
 from jaxident.diagnosis.windows import Windows
@@ -24,6 +25,7 @@ ENOUGH = 9.0
 """Gain beyond the penalty that claims an effect. With it a coordinate that does nothing gains as much once in three
 million times (chi-squared at 26), if the noise law is right; the rest is room for a law that is not quite."""
 MOST_EFFECTS = 3
+SIDES = ("right", "left")
 
 
 class Candidate(NamedTuple):
@@ -71,8 +73,8 @@ def search_effects(windows: Windows, use: Array, nominal: Solution, law: Law, *,
     selected = _grow(found, data)
     solution = found[selected].solution
     again = resized(solution, data, responses, again, sized)
-    terms = remaining(data, solution, responses, again, sized)
-    return Finding(data, again, found[()].solution, found, selected, terms)
+    terms, law = remaining(data, solution, responses, again, sized)
+    return Finding(data, law, found[()].solution, found, selected, terms)
 
 
 def resized(solution: Solution, data: Data, responses: Responses, law: Law, sized: bool) -> Law:
@@ -152,23 +154,31 @@ def _with_look_alikes(scores: dict[str, float]) -> list[str]:
     return list(dict.fromkeys([*best, *near]))
 
 
-def remaining(data: Data, solution: Solution, responses: Responses, law: Law, sized: bool) -> list[tuple[Any, float]]:
-    """Terms of the corrector that a solution leaves room for, each with the fall of -log p that it brings.
+def remaining(data: Data, solution: Solution, responses: Responses, law: Law, sized: bool):
+    """Terms of the corrector that a solution leaves room for, each with the fall of -log p that it brings, and the law
+    beside them.
 
     A law sized beside a gap takes the gap for slip or a memory of the camera. So terms are first chosen as if the
     noise were white, the law is sized again at what they leave, and only then do they count.
     """
     linear = solution.linear
-    corrector = library(linear.residual, data.windows, responses)
-    columns = np.concatenate([linear.slopes, corrector.columns, linear.residual[..., None]], axis=2)
+    terms, answers = library(linear.residual, data.windows, responses)
+    found = rhythms(data, solution, responses)
+    terms += tuple(
+        Term("drive", f"every {r.period:.3f} m of the {side} wheel", r.price)
+        for r, side in zip(found, SIDES, strict=True)
+    )
+    turning = np.stack([r.column for r in found], axis=2)
+    columns = np.concatenate([linear.slopes, answers, turning, linear.residual[..., None]], axis=2)
     base = list(range(len(solution.places)))
-    candidates = [len(base) + k for k in range(len(corrector.terms))]
+    candidates = [len(base) + k for k in range(len(terms))]
+    prices = np.array([term.price for term in terms])
 
     def chosen(whitener: Array) -> tuple[list, np.ndarray]:
         """Terms, and the residuals that they and the solution's own coordinates would leave."""
         used = data.use
         products = gram(whitener[used], columns[used], linear.starts[used]).products.sum(axis=0)
-        found = pursue(products, base, candidates)
+        found = pursue(products, base, candidates, prices)
         free = [*base, *(place for place, _ in found)]
         own, cross, scale = normal(products, free)
         return found, linear.residual - columns[..., free] @ (np.linalg.solve(own, cross) / scale)
@@ -178,5 +188,6 @@ def remaining(data: Data, solution: Solution, responses: Responses, law: Law, si
         _, left = chosen(white_whitener(law, data.windows))
         again = size_noise(left, linear.starts, data.windows, responses, data.use)
         others, _ = chosen(whitener_of(again, data.windows, responses))
-        found = max(found, others, key=lambda terms: sum(gain for _, gain in terms))
-    return [(corrector.terms[place - len(base)], gain) for place, gain in found]
+        if sum(gain for _, gain in others) > sum(gain for _, gain in found):
+            found, law = others, again
+    return [(terms[place - len(base)], gain) for place, gain in found], law

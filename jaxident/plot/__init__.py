@@ -19,6 +19,7 @@ _HOMES = {
     "residuals": "fits",
     "correlation": "fits",
     "effect_signature": "effects",
+    "confusion": "diagnosis",
     "gap_levels": "diagnosis",
     "gap_map": "diagnosis",
     "ranking": "diagnosis",

@@ -148,6 +148,25 @@ def shrinks(
     return ax
 
 
+def confusion(named: Any, rows: Sequence[str], columns: Sequence[str], *, ax: Axes | None = None) -> Axes:
+    """Shares (rows, columns) of what was hidden (rows) that came out as what (columns), in per cent; below one none is
+    written."""
+    shares = 100.0 * np.asarray(named, float)
+    ax = style.axes_or_new(ax, (style.WIDTH, 1.4 + 0.2 * len(rows)))
+    ax.imshow(shares, cmap=MAP, norm=PowerNorm(0.5, 0.0, 100.0), aspect="auto")
+    for row, column in zip(*np.nonzero(shares >= 1.0), strict=True):
+        share = shares[row, column]
+        colour = style.BLACK if PowerNorm(0.5, 0.0, 100.0)(share) > BRIGHT else "white"
+        ax.text(column, row, f"{share:.0f}", ha="center", va="center", color=colour, fontsize=style.TEXT - 2)
+    ax.set_yticks(range(len(rows)), list(rows))
+    ax.set_xticks(range(len(columns)), list(columns), rotation=90)
+    ax.grid(visible=False)
+    ax.tick_params(length=0)
+    ax.set_ylabel("hidden")
+    ax.set_xlabel("named")
+    return ax
+
+
 def _colour_bar(ax: Axes, shown: Any, label: str) -> None:
     """What the colours mean, above the map, told at five evenly spread ones."""
     bar = ax.figure.colorbar(shown, ax=ax, location="top", aspect=45, pad=0.02)

@@ -1,0 +1,109 @@
+"""What this input can tell apart: faint effects and none, replayed under the noise of these very logs and named.
+
+To first order in the effects every statistic of the scores follows from one Gram matrix, so that thousands of replays
+cost as much as one score (parametric bootstrap; Efron and Tibshirani 1993, chapter 6).
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jaxident.array_types import Array
+from jaxident.diagnosis.coordinates import COORDINATES, PLACES, SHAPES, SMOOTH, from_catalogue, unit_factors
+from jaxident.diagnosis.linear import follow, gram, linearise, normal
+from jaxident.diagnosis.scores import seeded
+from jaxident.diagnosis.search import Data, Solution
+from jaxident.diagnosis.which import ENOUGH, PENALTY
+from jaxident.effects.catalogue import CATALOGUE
+
+FAINT = 40.0
+"""Expected gain of the replayed effects: three to six times what a claim asks for."""
+DRAWS = 400
+"""Replays of each effect; ten times as many of none."""
+
+
+class Answers(NamedTuple):
+    """products (n, n): Gram matrix of whitened answers of the poses, nominal parameters and start states projected out.
+    own: by effect its columns, one per coordinate, or that at typical size where it has no derivative at neutral;
+    typical: by effect the column of its typical size."""
+
+    products: Any
+    own: dict[str, list[int]]
+    typical: dict[str, int]
+
+
+class Replay(NamedTuple):
+    """named (1 + effects, 1 + effects): share of replays with an effect (row) that came out as another (column); first
+    of both is none. effects: their names; those that this input does not show at all are left out."""
+
+    effects: tuple[str, ...]
+    named: Any
+
+
+def answers(data: Data, nominal: Solution, largest: float, duration: float) -> Answers:
+    """How the poses answer to every effect. Commands are over `largest`; duration [s] of all runs."""
+    smooth = {
+        name: [PLACES[name, c.name] for c in COORDINATES[name] if (name, c.name) not in SHAPES] for name in SMOOTH
+    }
+    places = [place for own in smooth.values() for place in own]
+    linear = linearise(nominal.vector, nominal.starts, data.windows, [*nominal.places, *places])
+    vectors = np.stack([_typical(nominal.vector, name, largest, duration) for name in COORDINATES])
+    starts = np.broadcast_to(nominal.starts, (len(vectors), *nominal.starts.shape))
+    change = np.moveaxis(nominal.linear.residual - follow(vectors, starts, data.windows), 0, -1)
+    columns = np.concatenate([linear.slopes, change], axis=2)[data.use]
+    products = gram(data.whitener[data.use], columns, linear.starts[data.use]).products.sum(axis=0)
+    order = {place: k for k, place in enumerate(places)}
+    typical = {name: len(places) + k for k, name in enumerate(COORDINATES)}
+    own = {name: [order[p] for p in smooth[name]] if name in smooth else [typical[name]] for name in COORDINATES}
+    return Answers(_without(products, len(nominal.places)), own, typical)
+
+
+def visible(found: Answers) -> dict[str, float]:
+    """The gain that each effect of typical size would have, nominal parameters refitted: what this input can show."""
+    return {name: max(0.5 * float(found.products[k, k]), 0.0) for name, k in found.typical.items()}
+
+
+def replay(found: Answers, seed: int = 0) -> Replay:
+    """Faint effects, each as large as makes its expected gain FAINT, named under replayed noise as the search names
+    them: by the largest evidence, if that is ENOUGH."""
+    rng = np.random.default_rng(seed)
+    gains = visible(found)
+    names = tuple(name for name, gain in gains.items() if gain > 1e-3)
+    values, vectors = np.linalg.eigh(found.products)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    table = np.zeros((1 + len(names), 1 + len(names)))
+    for row, hidden in enumerate(("", *names)):
+        cross = root @ rng.normal(size=(len(values), DRAWS if hidden else 10 * DRAWS))
+        if hidden:
+            size = np.sqrt(FAINT / gains[hidden])
+            cross += size * found.products[:, [found.typical[hidden]]]
+        evidence = np.stack([_evidence(found, name, cross) for name in names])
+        named = np.where(evidence.max(axis=0) > ENOUGH, 1 + evidence.argmax(axis=0), 0)
+        table[row] = np.bincount(named, minlength=len(table)) / len(named)
+    return Replay(names, table)
+
+
+def _evidence(found: Answers, name: str, cross: Array) -> np.ndarray:
+    """Gain of an effect (draws,) less the price of its coordinates, from products with the residual (n, draws)."""
+    own = found.own[name]
+    scale = np.sqrt(np.maximum(np.diagonal(found.products)[own], 1e-300))
+    matrix = found.products[np.ix_(own, own)] / scale[:, None] / scale + 1e-9 * np.eye(len(own))
+    right = cross[own] / scale[:, None]
+    return 0.5 * np.sum(right * np.linalg.solve(matrix, right), axis=0) - PENALTY * len(COORDINATES[name])
+
+
+def _typical(vector: Array, name: str, largest: float, duration: float) -> np.ndarray:
+    """A vector with an effect at its typical size."""
+    typical = CATALOGUE[name].typical()
+    if name == "payload_change":
+        typical["instant"] = 0.5 * duration
+    factors = unit_factors(name, largest)
+    return seeded(vector, name, from_catalogue(name, {key: value / factors[key] for key, value in typical.items()}))
+
+
+def _without(products: Array, count: int) -> np.ndarray:
+    """Products of the later columns with the first `count` projected out."""
+    base = list(range(count))
+    own, _, scale = normal(products, base)
+    cross = products[:count, count:] / scale[:, None]
+    return products[count:, count:] - cross.T @ np.linalg.solve(own, cross)
