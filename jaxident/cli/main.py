@@ -52,6 +52,8 @@ def program() -> None:
 
 def run() -> None:
     """Entry point of `jaxident` and `python -m jaxident`: exit 0 done, 2 wrong use or bad input, 1 the work failed."""
+    # two threads make NumPy's small matrices five times slower on a busy machine; read once, when NumPy is loaded
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     warnings.showwarning = lambda message, *_, **__: print(f"warning: {message}", file=sys.stderr)
     try:
         code = program.main(prog_name="jaxident", standalone_mode=False)

@@ -18,7 +18,6 @@ from jaxident.diagnosis.noise import Law
 from jaxident.diagnosis.prepare import BURN, horizon_rows
 from jaxident.diagnosis.scores import seeded, seeds
 from jaxident.diagnosis.translate import scaled
-from jaxident.diagnosis.windows import Windows, uncut
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.errors import InputError
 from jaxident.robot.model import Model, require_physical
@@ -108,7 +107,7 @@ def ask(
         size = _inner(name, sizes[name], limit)
         expected.append(len(vectors))
         vectors.append(seeded(base, name, size))
-        own = _points(name, size, uncut(np.zeros((1, samples, 2)), period))
+        own = _points(name, size, samples * period)
         rays.append([_ray(vectors, base, name, point) for point in own])
     return Question(base, np.stack(vectors), (expected[0], expected[1]), (rays[0], rays[1]), law_of(noise, period),
                     period, rows)  # fmt: skip
@@ -120,10 +119,10 @@ def _inner(name: str, parameters: dict[str, Any], limit: float) -> dict[str, flo
     return from_catalogue(name, {key: float(value) / factors[key] for key, value in parameters.items()})
 
 
-def _points(name: str, size: dict[str, float], whole: Windows) -> list[dict[str, float]]:
-    """Coordinates at which an effect may explain another."""
+def _points(name: str, size: dict[str, float], duration: float) -> list[dict[str, float]]:
+    """Coordinates at which an effect may explain another; duration [s] of the input."""
     if name not in SMOOTH:
-        return [size, *seeds(name, whole)]
+        return [size, *seeds(name, duration)]
     return [{key: v if (name, key) in SHAPES else scale * v for key, v in size.items()} for scale in SCALES]
 
 

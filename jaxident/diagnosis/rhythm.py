@@ -29,8 +29,8 @@ class Rhythm(NamedTuple):
 
 
 class Travel(NamedTuple):
-    """Of one wheel: the push that its speed stands for and what has been travelled of it in its run (windows, rows), and
-    the speeds along and in heading (2,) that a unit of it makes."""
+    """Of one wheel: what has been travelled in its run and the push that its speed stands for (windows, rows); the
+    speeds along and in heading (2,) that a unit of push makes."""
 
     gone: Any
     push: Any

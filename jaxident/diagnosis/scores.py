@@ -1,5 +1,7 @@
 """Scores of all effects from one fit, without refitting: which are worth a refit, and which this input could show."""
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from jaxident.array_types import Array
@@ -14,26 +16,34 @@ from jaxident.diagnosis.linear import explained, follow, gram, left_over, linear
 from jaxident.diagnosis.search import Data, Solution
 from jaxident.diagnosis.steps import likely_steps
 
+STEPS = np.geomspace(0.02, 0.4, 96)
+"""Steps of a quantised command where nothing suggests better ones, in largest commands."""
 INSTANTS = (10.0, 1.2, 0.15)
 """Reach [s] of each search for an instant about the best before."""
 
 
-def seeds(name: str, data: Data, solution: Solution) -> list[dict[str, float]]:
-    """Points from which an effect without a derivative at neutral is looked for; one neutral point for the others."""
+def seeds(name: str, duration: float, steps: Iterable[float] = STEPS) -> list[dict[str, float]]:
+    """Points from which an effect without a derivative at neutral is looked for; one neutral point for the others.
+    duration [s] of all runs; steps of a quantised command."""
     if name == "input_saturation":
         return [{"level": level} for level in (0.9, 0.75, 0.6, 0.45, 0.3)]
     if name == "input_quantisation":
-        return [{"step": float(step)} for step in likely_steps(data, solution)]
+        return [{"step": float(step)} for step in steps]
     if name == "input_rate_limit":
         return [{"inverse_rate": inverse} for inverse in (0.03, 0.07, 0.15, 0.3, 0.6)]
     if name == "stiction":
         return [{"right": s, "left": s, "fade": fade} for s, fade in ((0.05, 0.05), (0.15, 0.05), (0.1, 0.15))]
     if name == "payload_change":
-        last = float(data.windows.session[-1] + data.windows.t[-1, -1])
-        return [{"loss": 0.1, "instant": last * part} for part in np.linspace(0.06, 0.94, 12)]
+        return [{"loss": 0.1, "instant": duration * part} for part in np.linspace(0.06, 0.94, 12)]
     if name == "lens_distortion":
         return [{"strength": 0.01}]
     return [{}]
+
+
+def _own_seeds(name: str, data: Data, solution: Solution) -> list[dict[str, float]]:
+    """Seeds for a solution's data; steps of a quantised command are those that its residuals suggest."""
+    steps = likely_steps(data, solution) if name == "input_quantisation" else STEPS
+    return seeds(name, float(data.windows.session[-1] + data.windows.t[-1, -1]), steps)
 
 
 def seeded(vector: Array, name: str, seed: dict[str, float]) -> np.ndarray:
@@ -53,7 +63,7 @@ def score(data: Data, solution: Solution) -> dict[str, float]:
     linear = linearise(solution.vector, solution.starts, data.windows, [*free, *more])
     jumps = [
         (name, seed) for name in COORDINATES if name not in SMOOTH and PLACES[_sizes_of(name)[0]] not in free
-        for seed in seeds(name, data, solution)
+        for seed in _own_seeds(name, data, solution)
     ]  # fmt: skip
     change = _differences(data, solution, [seeded(solution.vector, *jump) for jump in jumps])
     columns = np.concatenate([linear.slopes, change, linear.residual[..., None]], axis=2)[data.use]
@@ -85,7 +95,7 @@ def _differences(data: Data, solution: Solution, vectors: list[np.ndarray]) -> n
 def beginnings(data: Data, solution: Solution, name: str) -> list[np.ndarray]:
     """Vectors from which to refit one more effect: neutral; or the seed that promises most, and one of middling size,
     for at a fit that a large effect has bent the promises mislead."""
-    points = seeds(name, data, solution)
+    points = _own_seeds(name, data, solution)
     if name in SMOOTH or len(points) == 1:
         return [seeded(solution.vector, name, points[0])]
     vectors, gains = _promises(data, solution, name, points)

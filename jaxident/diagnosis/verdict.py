@@ -78,9 +78,15 @@ def unknown_probability(finding: Finding, gap: Gap) -> float:
     share = rest / max(gained + rest, 1e-9)
     large = _logistic((rest - SIGNIFICANT) / SHARPNESS[1])
     explained = large * _logistic((share - UNEXPLAINED) / SHARPNESS[0])
-    excess = interval(gap.errors[2])[0] / max(gap.floor_interval[1], 1e-9)
-    beyond = (_beyond(excess, EXCESS), _beyond(slip_of_drive(finding), BELIEVABLE))
+    beyond = _beyond(excess_of(gap), EXCESS), _beyond(slip_of_drive(finding), BELIEVABLE)
     return 1.0 - (1.0 - explained) * (1.0 - beyond[0]) * (1.0 - beyond[1])
+
+
+def excess_of(gap: Gap) -> float:
+    """The corrected model's error on runs that served nothing else, at the low end of its interval, over the high end
+    of what noise makes."""
+    errors = np.asarray(gap.errors[2])
+    return interval(errors)[0] / max(gap.floor_interval[1], 1e-9) if np.isfinite(errors).all(axis=1).any() else 0.0
 
 
 def slip_of_drive(finding: Finding) -> float:

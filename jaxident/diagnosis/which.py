@@ -6,13 +6,11 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.coordinates import COORDINATES, SHAPES
-from jaxident.diagnosis.corrector import Term, library, pursue
-from jaxident.diagnosis.linear import gram, normal
-from jaxident.diagnosis.noise import Law, size_noise, white_whitener, whitener_of
+from jaxident.diagnosis.noise import Law, size_noise, whitener_of
 from jaxident.diagnosis.responses import Responses, respond
-from jaxident.diagnosis.rhythm import rhythms
 from jaxident.diagnosis.scores import at_best_instant, beginnings, score
 from jaxident.diagnosis.search import Data, Solution, refit
+from jaxident.diagnosis.unexplained import unexplained
 from jaxident.diagnosis.windows import Windows
 from jaxident.effects.catalogue import CATALOGUE
 
@@ -25,7 +23,6 @@ ENOUGH = 9.0
 """Gain beyond the penalty that claims an effect. With it a coordinate that does nothing gains as much once in three
 million times (chi-squared at 26), if the noise law is right; the rest is room for a law that is not quite."""
 MOST_EFFECTS = 3
-SIDES = ("right", "left")
 
 
 class Candidate(NamedTuple):
@@ -73,7 +70,7 @@ def search_effects(windows: Windows, use: Array, nominal: Solution, law: Law, *,
     selected = _grow(found, data)
     solution = found[selected].solution
     again = resized(solution, data, responses, again, sized)
-    terms, law = remaining(data, solution, responses, again, sized)
+    terms, law = unexplained(data, solution, responses, again, sized)
     return Finding(data, law, found[()].solution, found, selected, terms)
 
 
@@ -152,42 +149,3 @@ def _with_look_alikes(scores: dict[str, float]) -> list[str]:
     best = _ranked(scores)[:REFITS]
     near = [other for name in best[:2] for other in CATALOGUE[name].confused_with if other in COORDINATES]
     return list(dict.fromkeys([*best, *near]))
-
-
-def remaining(data: Data, solution: Solution, responses: Responses, law: Law, sized: bool):
-    """Terms of the corrector that a solution leaves room for, each with the fall of -log p that it brings, and the law
-    beside them.
-
-    A law sized beside a gap takes the gap for slip or a memory of the camera. So terms are first chosen as if the
-    noise were white, the law is sized again at what they leave, and only then do they count.
-    """
-    linear = solution.linear
-    terms, answers = library(linear.residual, data.windows, responses)
-    found = rhythms(data, solution, responses)
-    terms += tuple(
-        Term("drive", f"every {r.period:.3f} m of the {side} wheel", r.price)
-        for r, side in zip(found, SIDES, strict=True)
-    )
-    turning = np.stack([r.column for r in found], axis=2)
-    columns = np.concatenate([linear.slopes, answers, turning, linear.residual[..., None]], axis=2)
-    base = list(range(len(solution.places)))
-    candidates = [len(base) + k for k in range(len(terms))]
-    prices = np.array([term.price for term in terms])
-
-    def chosen(whitener: Array) -> tuple[list, np.ndarray]:
-        """Terms, and the residuals that they and the solution's own coordinates would leave."""
-        used = data.use
-        products = gram(whitener[used], columns[used], linear.starts[used]).products.sum(axis=0)
-        found = pursue(products, base, candidates, prices)
-        free = [*base, *(place for place, _ in found)]
-        own, cross, scale = normal(products, free)
-        return found, linear.residual - columns[..., free] @ (np.linalg.solve(own, cross) / scale)
-
-    found, _ = chosen(data.whitener)
-    if sized and law != Law(law.position, law.heading):
-        _, left = chosen(white_whitener(law, data.windows))
-        again = size_noise(left, linear.starts, data.windows, responses, data.use)
-        others, _ = chosen(whitener_of(again, data.windows, responses))
-        if sum(gain for _, gain in others) > sum(gain for _, gain in found):
-            found, law = others, again
-    return [(terms[place - len(base)], gain) for place, gain in found], law

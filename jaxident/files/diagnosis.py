@@ -2,7 +2,10 @@
 
 from typing import Any
 
+import numpy as np
+
 from jaxident.diagnosis.diagnose import Diagnosis, Gap
+from jaxident.diagnosis.replay import Replay
 from jaxident.diagnosis.where import OF_COMMANDS, Region
 from jaxident.effects.catalogue import CATALOGUE
 
@@ -31,6 +34,7 @@ def diagnosis_to_dict(found: Diagnosis) -> dict[str, Any]:
         "surplus": list(found.surplus),
         "parameters": [p._asdict() for p in found.parameters],
         "not_testable": found.not_testable,
+        "replays": _replays(found.replay),
         "unexplained": [{"site": term.site, "term": term.name, "gain": gain} for term, gain in found.finding.terms],
         "next": found.next,
     }
@@ -62,6 +66,15 @@ def _region(region: Region, largest: float) -> dict[str, Any]:
         "to": factor * region.high,
         "share": region.share,
         "p_value": region.p_value,
+    }
+
+
+def _replays(replay: Replay) -> dict[str, Any]:
+    """How often the scores claim an effect without any, and name each faint one, on this input and noise."""
+    right = np.diagonal(replay.named)[1:]
+    return {
+        "false_claims": float(1.0 - replay.named[0, 0]),
+        "named_when_faint": {name: float(share) for name, share in zip(replay.effects, right, strict=True)},
     }
 
 

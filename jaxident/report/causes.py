@@ -2,14 +2,18 @@
 
 from collections.abc import Iterable
 
+import numpy as np
+
 from jaxident import plot
 from jaxident.diagnosis.coordinates import COORDINATES
 from jaxident.diagnosis.diagnose import Diagnosis
+from jaxident.diagnosis.replay import DRAWS, FAINT, Replay
+from jaxident.diagnosis.verdict import BELIEVABLE, EXCESS, excess_of, slip_of_drive
 from jaxident.diagnosis.visible import smallest_sizes
 from jaxident.diagnosis.which import ENOUGH, PENALTY, Candidate
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.report.page import Figure, Section, Table
-from jaxident.report.words import EFFECTS, chance, parameters, percent, plain, together
+from jaxident.report.words import EFFECTS, chance, number, parameters, percent, plain, together
 
 SHOWN = 10
 """Candidates in a picture: the best of them."""
@@ -103,7 +107,7 @@ def _unexplained(found: Diagnosis) -> list[str | Table]:
     """What a library of forces, speeds and camera errors explains beyond the best set."""
     terms = found.finding.terms
     if not terms:
-        return ["Beyond these nothing systematic is left for a library of forces and camera errors to explain."]
+        return [*_beyond_words(found), NO_TERMS]
     rows = [(term.name, term.site, float(gain)) for term, gain in terms]
     rest = sum(gain for _, gain in terms)
     gained = found.finding.candidates[found.finding.selected].gain
@@ -112,7 +116,24 @@ def _unexplained(found: Diagnosis) -> list[str | Table]:
         f"would explain more, {percent(rest / max(gained + rest, 1e-9))} of all that can be explained. Commands, and "
         "so the words small and large, are over the largest one."
     )
-    return [text, Table(("term", "site", "gain"), rows, "They are no effects by name; they say where to look.")]
+    table = Table(("term", "site", "gain"), rows, "They are no effects by name; they say where to look.")
+    return [text, table, *_beyond_words(found)]
+
+
+NO_TERMS = "A library of simple forces and camera errors explains nothing more."
+
+
+def _beyond_words(found: Diagnosis) -> list[str]:
+    """What speaks for something unknown without saying where."""
+    excess, slip = excess_of(found.gap), slip_of_drive(found.finding)
+    words = []
+    if excess > EXCESS:
+        words.append(f"Stretches that took no part in any fit are predicted {number(excess)} times worse than noise "
+                     "allows, at the least.")  # fmt: skip
+    if slip > BELIEVABLE:
+        words.append(f"What is left looks like random slip of {percent(slip)} of full drive: more than wheels slip "
+                     "without a cause.")  # fmt: skip
+    return words
 
 
 def shrink(found: Diagnosis) -> Section:
@@ -161,7 +182,35 @@ def hidden(found: Diagnosis) -> Section:
         if missed else "This input would have shown every effect that shapes the path, at its typical size."
     )  # fmt: skip
     table = Table(("effect", "typical size", "gain", "visible", "smallest visible"), rows, HIDDEN_CAPTION)
-    return Section("What this input could have shown", [lead, table, DIRECT])
+    return Section("What this input could have shown", [lead, table, DIRECT, *_replays(found.replay)])
+
+
+def _replays(replay: Replay) -> list[str | Figure]:
+    """What faint effects come out as on this input."""
+    if not replay.effects:
+        return []
+    labels = ["none", *(plain(name) for name in replay.effects)]
+    count, own = len(replay.effects), np.diagonal(replay.named)[1:]
+    poor = [plain(name) for name, share in zip(replay.effects, own, strict=True) if share < TOLD]
+    text = REPLAYS.format(
+        wrong=percent(1.0 - replay.named[0, 0]), right=percent(float(own.mean())), count=count,
+        poor=f" Named in fewer than {percent(TOLD)}: {together(poor)}." if poor else "",
+    )  # fmt: skip
+    figure, ax = plot.figure(size=(6.3, 1.5 + 0.17 * len(labels)))
+    plot.confusion(replay.named, labels, labels, ax=ax)
+    return [text, Figure(plot.image(figure), "What faint effects come out as", REPLAYS_CAPTION)]
+
+
+TOLD = 0.8
+"""Share of replays in which a faint effect should be named."""
+REPLAYS = (
+    "Replays on this very input and noise: without any effect {wrong} claim one; each of {count} effects, made faint, "
+    "is named in {right} on average.{poor}"
+)
+REPLAYS_CAPTION = (
+    f"Rows: what was hidden, so faint that its expected gain is {FAINT:g}; columns: what its scores name, in per cent "
+    f"of {DRAWS} replays. To first order in the effect, one effect at a time, all fits taken to succeed."
+)
 
 
 HIDDEN_CAPTION = (

@@ -38,10 +38,12 @@ def test_pursuit_finds_what_was_put_in_and_stops():
     table = rng.normal(size=(2000, 42))
     target = 0.5 * table[:, 0] + 0.4 * table[:, 7] - 0.2 * table[:, 20] + rng.normal(size=2000)
     whole = np.column_stack([table, target])
-    chosen = pursue(whole.T @ whole, [0, 1], list(range(2, 42)))
+    chosen = pursue(whole.T @ whole, [0, 1], list(range(2, 42)), np.zeros(40))
     assert [place for place, _ in chosen] == [7, 20]
     rest = squares(table[:, [0, 1]], target) - squares(table[:, [0, 1, 7]], target)
     assert chosen[0][1] == pytest.approx(rest, rel=1e-6)
+    dear = np.where(np.arange(2, 42) == 20, 1e3, 0.0)
+    assert [place for place, _ in pursue(whole.T @ whole, [0, 1], list(range(2, 42)), dear)] == [7]
 
 
 def test_start_states_answer_as_differences_do():

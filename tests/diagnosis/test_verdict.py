@@ -1,12 +1,18 @@
 """Probabilities from evidence that is made up."""
 
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
 from support.diagnoses import made_up
 
 from jaxident.diagnosis.corrector import Term
-from jaxident.diagnosis.verdict import alike, judge, unknown_probability
+from jaxident.diagnosis.noise import Law
+from jaxident.diagnosis.verdict import alike, judge, slip_of_drive, unknown_probability
 from jaxident.diagnosis.which import Candidate
 
 NONE: dict[str, float] = {}
+GAP = made_up("effects").gap
 
 
 def finding(gains, selected, terms=()):
@@ -21,7 +27,7 @@ def whole(judgement):
 
 
 def test_a_large_gain_names_its_effect():
-    found = judge(finding({("slope",): 500.0, ("turn_loss",): 30.0}, ("slope",)), NONE)
+    found = judge(finding({("slope",): 500.0, ("turn_loss",): 30.0}, ("slope",)), GAP, NONE)
     assert abs(whole(found) - 1.0) < 1e-9
     assert found.causes[0].effect == "slope"
     assert found.causes[0].probability > 0.99
@@ -29,7 +35,7 @@ def test_a_large_gain_names_its_effect():
 
 
 def test_gains_by_chance_are_no_effect():
-    found = judge(finding({("slope",): 4.0, ("turn_loss",): 5.0}, ()), NONE)
+    found = judge(finding({("slope",): 4.0, ("turn_loss",): 5.0}, ()), GAP, NONE)
     assert found.none > 0.95
     assert abs(whole(found) - 1.0) < 1e-9
 
@@ -46,18 +52,38 @@ def test_effects_nearly_as_good_are_named_together():
 def test_what_the_corrector_explains_beside_a_poor_effect_is_unknown():
     term = (Term("drive", "v^3 in the acceleration along"), 400.0)
     found = finding({("slope",): 300.0}, ("slope",), [term])
-    assert unknown_probability(found) > 0.95
-    assert judge(found, NONE).sites["drive"] > 0.9
-    assert unknown_probability(finding({("slope",): 9000.0}, ("slope",), [term])) < 0.05
-    assert unknown_probability(finding({}, (), [(term[0], 10.0)])) < 0.2
+    assert unknown_probability(found, GAP) > 0.95
+    assert judge(found, GAP, NONE).sites["drive"] > 0.9
+    assert unknown_probability(finding({("slope",): 9000.0}, ("slope",), [term]), GAP) < 0.05
+    assert unknown_probability(finding({}, (), [(term[0], 10.0)]), GAP) < 0.2
 
 
 def test_frames_that_lie_are_an_effect_by_themselves():
-    found = judge(finding({}, ()), {"frozen_frames": 300.0})
+    found = judge(finding({}, ()), GAP, {"frozen_frames": 300.0})
     assert found.none < 0.01
     assert found.causes[0].effect == "frozen_frames"
 
 
 def test_what_the_simulator_has_too_is_no_gap():
-    found = judge(finding({("slope",): 500.0}, ("slope",)), NONE, ("slope",))
+    found = judge(finding({("slope",): 500.0}, ("slope",)), GAP, NONE, ("slope",))
     assert found.none > 0.99
+
+
+def test_errors_beyond_the_floor_on_runs_kept_for_judging_are_unknown():
+    found = finding({("slope",): 500.0}, ("slope",))
+    assert unknown_probability(found, GAP) < 0.05
+    assert unknown_probability(found, GAP._replace(errors=10.0 * GAP.errors)) > 0.95
+
+
+def test_more_slip_than_wheels_have_is_unknown():
+    nominal = SimpleNamespace(vector=np.array([1.0, 1.5, 0.5, 0.5, 5.0, -5.0]))
+
+    def slipping(part):
+        law = Law(1e-3, 5e-3, (part * 1.0, part * 10.0), 0.2)
+        return finding({}, ())._replace(law=law, nominal=nominal)
+
+    assert slip_of_drive(slipping(0.01)) == pytest.approx(0.01)
+    assert unknown_probability(slipping(0.01), GAP) < 0.05
+    found = judge(slipping(0.1), GAP, NONE)
+    assert found.unknown > 0.95
+    assert found.sites["drive"] + found.sites["contact"] > 0.7

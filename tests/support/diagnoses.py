@@ -10,6 +10,7 @@ from jaxident.diagnosis.diagnose import Diagnosis, Gap, Parameter
 from jaxident.diagnosis.gap import Floor, Shrink
 from jaxident.diagnosis.noise import Law
 from jaxident.diagnosis.prepare import Frames, Prepared
+from jaxident.diagnosis.replay import Replay
 from jaxident.diagnosis.verdict import Cause, Judgement
 from jaxident.diagnosis.where import Place, Region
 from jaxident.diagnosis.which import Candidate, Finding
@@ -20,6 +21,7 @@ from jaxident.robot.model import Effect, Model
 VERDICTS = ("no_gap", "parameters", "effects", "unknown", "undecided")
 LARGEST = 2.0
 _LAW = Law(1e-3, 5e-3)
+REPLAY = Replay(("slope", "motor_lag"), np.array([[0.99, 0.01, 0.0], [0.02, 0.98, 0.0], [0.3, 0.0, 0.7]]))
 _NOTHING: Any = None
 """Stands for parts of a search that no page shows."""
 
@@ -43,7 +45,8 @@ def made_up(verdict: str, *, given: bool = False) -> Diagnosis:
         Gap(1.0, *levels, 1.05, (0.8, 1.3), shrink, placebo, errors, replay), _place(gap),
         selected if effects else (),
         [Parameter(n, 2.0 if given else None, 2.0 + 0.1 * k, 0.06) for k, n in enumerate(NOMINAL)],
-        {name: 1.7**k / 10.0 for k, name in enumerate(reversed(COORDINATES))}, "Record a longer <run> & more.",
+        {name: 1.7**k / 10.0 for k, name in enumerate(reversed(COORDINATES))},
+        REPLAY, "Record a longer <run> & more.",
         model, _with_effects(model, selected), shrinks, Prepared(_NOTHING, LARGEST, _NOTHING, _NOTHING, 1.0,
         Frames(_NOTHING, _NOTHING), _NOTHING, _LAW), _finding(selected, gap, verdict),
     )  # fmt: skip

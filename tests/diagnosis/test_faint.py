@@ -1,0 +1,132 @@
+"""Searches that no derivative serves, and replays: each against what was put in."""
+
+import numpy as np
+import pytest
+
+from jaxident.diagnosis.coordinates import COORDINATES, PLACES, neutral_vector, nominal_vector
+from jaxident.diagnosis.linear import explained, follow, gram
+from jaxident.diagnosis.noise import Law, white_whitener
+from jaxident.diagnosis.replay import Answers, answers, replay, visible
+from jaxident.diagnosis.responses import respond
+from jaxident.diagnosis.rhythm import rhythms
+from jaxident.diagnosis.scores import at_best_instant
+from jaxident.diagnosis.search import Data, refit
+from jaxident.diagnosis.steps import likely_steps
+from jaxident.diagnosis.windows import cut
+from jaxident.effects.catalogue import CATALOGUE
+from jaxident.log import join, make_log
+from jaxident.robot.drive import Physical
+
+ROWS, RUNS, STEP = 320, 3, 0.03
+LAW = Law(2e-4, 2e-3)
+VECTOR = neutral_vector(
+    nominal_vector(Physical(np.array([3.0, 5.0]), np.array([[0.5, 0.4], [9.0, -8.5]])), np.array([0.1, 0.12]))
+)
+
+
+def windows_of(vector, seed=0):
+    """Windows of noisy poses that the follower itself makes from whole runs, so that a fit of its form is exact."""
+    rng = np.random.default_rng(seed)
+    runs, t = [], np.arange(ROWS) * STEP
+    for _ in range(RUNS):
+        u = np.repeat(np.round(rng.uniform(-1.0, 1.0, (ROWS // 10, 2)), 3), 10, axis=0)
+        runs.append(make_log(t, u[:, 0], u[:, 1], 0.0 * t, 0.0 * t, 0.0 * t))
+    whole = cut(join(runs), ROWS)
+    path = -follow(vector[None], np.zeros((1, 5, RUNS)), whole)[0].reshape(RUNS, ROWS, 3)
+    path = path + rng.normal(size=path.shape) * [LAW.position, LAW.position, LAW.heading]
+    poses = [log._replace(x=p[:, 0], y=p[:, 1], theta=p[:, 2]) for log, p in zip(runs, path, strict=True)]
+    return cut(join(poses), 40)
+
+
+def nominal_fit(windows):
+    data = Data(windows, white_whitener(LAW, windows), np.ones(len(windows.run), bool))
+    begin = np.zeros((5, len(windows.run)))
+    begin[:3] = windows.pose[0].T
+    return data, refit(data, VECTOR, begin, ())
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return nominal_fit(windows_of(VECTOR))
+
+
+def test_the_step_of_a_quantised_command_is_found_among_many():
+    for step in (0.05359, 0.17):
+        vector = VECTOR.copy()
+        vector[PLACES["input_quantisation", "step"]] = step
+        found = likely_steps(*nominal_fit(windows_of(vector)))
+        assert abs(found[0] / step - 1.0) < 0.01
+
+
+def test_a_payload_is_placed_where_it_came():
+    vector = VECTOR.copy()
+    place = PLACES["payload_change", "instant"]
+    vector[PLACES["payload_change", "loss"]], vector[place] = 0.4, 13.3
+    data, nominal = nominal_fit(windows_of(vector))
+    begin = nominal.vector.copy()
+    begin[PLACES["payload_change", "loss"]], begin[place] = 0.1, 18.0
+    held = (("payload_change", "instant"),)
+    first = refit(data, begin, nominal.starts, ("payload_change",), held, most=4)
+    assert abs(at_best_instant(data, first)[place] - 13.3) < 0.3
+
+
+def test_rhythms_of_wheels_are_found_with_their_price(plain):
+    data, nominal = plain
+    responses = respond(np.exp(nominal.vector[:2]), nominal.linear.residual, data.windows)
+
+    def gains(solution, found):
+        columns = np.stack([*(r.column for r in found), solution.linear.residual], axis=2)
+        products = gram(data.whitener, columns, solution.linear.starts).products.sum(axis=0)
+        return [explained(products, [], [k]) - r.price for k, r in enumerate(found)]
+
+    quiet = rhythms(data, nominal, responses)
+    assert max(gains(nominal, quiet)) < 9.0
+    # what the search itself calls a rhythm of the right wheel, of 3 % of the radius
+    linear = nominal.linear._replace(residual=nominal.linear.residual + 0.03 * quiet[0].column)
+    turning = nominal._replace(linear=linear)
+    loud = rhythms(data, turning, responses)
+    assert loud[0].period == pytest.approx(quiet[0].period, rel=0.1)
+    assert gains(turning, loud)[0] > 9.0
+
+
+def test_answers_are_what_least_squares_leaves_of_them(plain):
+    data, nominal = plain
+    found = answers(data, nominal, 1.0, RUNS * ROWS * STEP)
+    vector = nominal.vector.copy()
+    vector[PLACES["turn_loss", "loss"]] = CATALOGUE["turn_loss"].typical()["loss"]
+    change = nominal.linear.residual - follow(vector[None], nominal.starts[None], data.windows)[0]
+    count, numbers = change.shape
+    white = [data.whitener[k] for k in range(count)]
+    base = np.zeros((count * numbers, 5 * count + 10))
+    for k in range(count):
+        own = slice(k * numbers, (k + 1) * numbers)
+        base[own, 5 * k : 5 * k + 5] = white[k] @ nominal.linear.starts[k]
+        base[own, -10:] = white[k] @ nominal.linear.slopes[k]
+    base /= np.linalg.norm(base, axis=0)
+    target = np.concatenate([w @ c for w, c in zip(white, change, strict=True)])
+    rest = target - base @ np.linalg.lstsq(base, target, rcond=None)[0]
+    assert visible(found)["turn_loss"] == pytest.approx(0.5 * float(rest @ rest), rel=1e-4)
+
+
+def test_replays_keep_false_claims_rare_and_name_what_is_hidden(plain):
+    data, nominal = plain
+    result = replay(answers(data, nominal, 1.0, RUNS * ROWS * STEP), 3)
+    np.testing.assert_allclose(result.named.sum(axis=1), 1.0)
+    assert result.named[0, 0] > 0.97
+    assert np.mean(np.diagonal(result.named)[1:]) > 0.5
+
+
+def test_replays_of_effects_that_answer_apart_are_all_named():
+    names = list(COORDINATES)[:4]
+    count = sum(len(COORDINATES[name]) for name in names) + len(names)
+    own, products, place = {}, np.eye(count), 0
+    for name in names:
+        own[name] = list(range(place, place + len(COORDINATES[name])))
+        place += len(COORDINATES[name])
+    typical = {name: place + k for k, name in enumerate(names)}
+    for name in names:  # the typical size is the first coordinate's
+        products[typical[name], :] = products[own[name][0], :]
+        products[:, typical[name]] = products[:, own[name][0]]
+    found = replay(Answers(products, own, typical), 1)
+    assert found.effects == tuple(names)
+    assert np.all(np.diagonal(found.named)[1:] > 0.95)
