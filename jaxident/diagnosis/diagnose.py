@@ -6,13 +6,14 @@ from typing import NamedTuple
 from jaxident.diagnosis import translate
 from jaxident.diagnosis.direct import direct_effects, direct_evidence
 from jaxident.diagnosis.gap import Shrink
+from jaxident.diagnosis.lost import find_lost
 from jaxident.diagnosis.measure import Gap, measure
-from jaxident.diagnosis.prepare import Prepared, prepare
+from jaxident.diagnosis.prepare import Prepared, prepare, repaired
 from jaxident.diagnosis.replay import Replay, answers, replay, visible
 from jaxident.diagnosis.simulator import inspect_simulator, shared
 from jaxident.diagnosis.verdict import Judgement, judge
 from jaxident.diagnosis.where import Place
-from jaxident.diagnosis.which import ENOUGH, Finding, search_effects
+from jaxident.diagnosis.which import ENOUGH, PENALTY, Finding, search_effects
 from jaxident.errors import InputError
 from jaxident.log import Log
 from jaxident.numerics import require_float64
@@ -20,6 +21,8 @@ from jaxident.robot.model import Model
 
 FEW, FEWEST = 6, 2
 """Windows that naming and judging need before anything is claimed."""
+REPAIRS = 2
+"""Times that lost commands are looked for: a second time under the noise that the first leaves."""
 DIFFERENT = 4.0
 """Standard deviations by which a parameter differs before the verdict says so."""
 
@@ -81,7 +84,7 @@ def diagnose(
         raise InputError("give the simulator's logs or a model, not both: each is the nominal model to judge")
     given = None if model is None else translate.to_coordinates(model, logs)
     prepared = prepare(logs, horizon, given)
-    finding = search_effects(prepared.windows, prepared.naming, prepared.nominal, prepared.law)
+    prepared, finding = search(prepared)
     simulator = None if sim is None else inspect_simulator(sim, prepared, finding)
     told = given if simulator is None else simulator.vector
     extra = direct_evidence(prepared, finding)
@@ -100,6 +103,22 @@ def diagnose(
     return Diagnosis(verdict, judgement, gap, where, selected if verdict == "effects" else (), parameters,
                      visible(known), replay(known, seed), advice(verdict, judgement), nominal, corrected, shrinks,
                      prepared, finding, surplus)  # fmt: skip
+
+
+def search(prepared: Prepared) -> tuple[Prepared, Finding]:
+    """The search, and again with the commands that arrived where saying that some were lost is worth more than the
+    effects found without: a delay, say, makes every change late, lost commands only some."""
+    finding = search_effects(prepared.windows, prepared.naming, prepared.nominal, prepared.law)
+    for _ in range(REPAIRS):
+        best = finding.candidates[finding.selected]
+        alone, beside = (find_lost(finding.data, solution) for solution in (finding.nominal, best.solution))
+        instead = alone.gain - best.evidence > beside.gain
+        lost, worth = (alone, alone.gain - best.evidence) if instead else (beside, beside.gain)
+        if worth - PENALTY < ENOUGH:
+            break
+        prepared = repaired(prepared, lost, worth - PENALTY)
+        finding = search_effects(prepared.windows, prepared.naming, prepared.nominal, prepared.law)
+    return prepared, finding
 
 
 def compare_parameters(prepared: Prepared, finding: Finding, given) -> list[Parameter]:

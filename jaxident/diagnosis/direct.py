@@ -1,4 +1,5 @@
-"""Effects that show without a refit: frames that repeat, outliers, a camera error with a memory."""
+"""Effects that show without a refit: commands that never arrived, frames that repeat, outliers, a camera error with a
+memory."""
 
 from jaxident.diagnosis.prepare import Prepared
 from jaxident.diagnosis.which import ENOUGH, Finding
@@ -12,6 +13,7 @@ def direct_evidence(prepared: Prepared, finding: Finding) -> dict[str, float]:
         "frozen_frames": 10.0 * frozen if frozen >= 3 else 0.0,
         # normal noise leaves OUTLYING deviations once in 10^11 rows
         "outliers": 10.0 * outlying if outlying >= max(3, 1e-4 * rows) else 0.0,
+        "lost_commands": prepared.lost[1],
         "coloured_noise": 2.0 * ENOUGH if finding.law.coloured is not None else 0.0,
     }
 
@@ -24,6 +26,8 @@ def direct_effects(prepared: Prepared, finding: Finding, selected) -> dict[str, 
         found["frozen_frames"] = {"probability": float(prepared.frames.frozen.sum() / rows)}
     if "outliers" in selected:
         found["outliers"] = {"probability": float(prepared.frames.outlying.sum() / rows)}
+    if "lost_commands" in selected:
+        found["lost_commands"] = {"probability": prepared.lost[0]}
     if "coloured_noise" in selected and finding.law.coloured is not None:
         position, heading = finding.law.coloured
         time = float(finding.law.coloured_time or 0.0)

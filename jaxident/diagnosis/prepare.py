@@ -9,6 +9,7 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.diagnosis.coordinates import neutral_vector, nominal_vector
 from jaxident.diagnosis.linear import START_STATES
+from jaxident.diagnosis.lost import Lost
 from jaxident.diagnosis.noise import Law, first_law, size_noise, white_whitener
 from jaxident.diagnosis.responses import respond
 from jaxident.diagnosis.search import Data, Solution, refit
@@ -39,7 +40,8 @@ class Frames(NamedTuple):
 
 class Prepared(NamedTuple):
     """The log with commands over `largest`; windows; which of them name, boolean (windows,), the others only judge the
-    gap; horizon [s] and its rows; the nominal fit and noise law from the windows that name."""
+    gap; horizon [s] and its rows; the nominal fit and noise law from the windows that name; the share of commands that
+    never arrived, and the gain of saying so: commands are those that did."""
 
     log: Log
     largest: float
@@ -49,6 +51,7 @@ class Prepared(NamedTuple):
     frames: Frames
     nominal: Solution
     law: Law
+    lost: tuple[float, float] = (0.0, 0.0)
 
 
 def prepare(
@@ -87,6 +90,16 @@ def prepare(
     responses = respond(np.exp(first.vector[:2]), first.linear.residual, windows)
     law = size_noise(first.linear.residual, first.linear.starts, windows, responses, naming)
     return Prepared(log, largest, windows, naming, horizon, Frames(frozen, outlying), first, law)
+
+
+def repaired(prepared: Prepared, lost: Lost, worth: float) -> Prepared:
+    """With the commands that arrived in place of those that were sent, which is worth some gain."""
+    log = prepared.log
+    arrived = np.concatenate([lost.arrived[: len(run.t), k] for k, run in enumerate(log.runs())])
+    log = log._replace(u_r=arrived[:, 0], u_l=arrived[:, 1])
+    windows = prepared.windows._replace(command=lost.arrived)
+    share, gain = prepared.lost
+    return prepared._replace(log=log, windows=windows, lost=(share + lost.share, gain + worth))
 
 
 def horizon_rows(horizon: float | None, period: float) -> tuple[int, float]:

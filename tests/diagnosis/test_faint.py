@@ -5,6 +5,7 @@ import pytest
 
 from jaxident.diagnosis.coordinates import COORDINATES, PLACES, neutral_vector, nominal_vector
 from jaxident.diagnosis.linear import explained, follow, gram
+from jaxident.diagnosis.lost import find_lost
 from jaxident.diagnosis.noise import Law, white_whitener
 from jaxident.diagnosis.replay import Answers, answers, replay, visible
 from jaxident.diagnosis.responses import respond
@@ -24,14 +25,17 @@ VECTOR = neutral_vector(
 )
 
 
-def windows_of(vector, seed=0):
-    """Windows of noisy poses that the follower itself makes from whole runs, so that a fit of its form is exact."""
+def windows_of(vector, seed=0, late=0):
+    """Windows of noisy poses that the follower itself makes from whole runs, so that a fit of its form is exact; every
+    fifth change of the command `late` rows."""
     rng = np.random.default_rng(seed)
     runs, t = [], np.arange(ROWS) * STEP
     for _ in range(RUNS):
         u = np.repeat(np.round(rng.uniform(-1.0, 1.0, (ROWS // 10, 2)), 3), 10, axis=0)
         runs.append(make_log(t, u[:, 0], u[:, 1], 0.0 * t, 0.0 * t, 0.0 * t))
     whole = cut(join(runs), ROWS)
+    for row in range(50, ROWS, 50):
+        whole.command[row : row + late] = whole.command[row - 1]
     path = -follow(vector[None], np.zeros((1, 5, RUNS)), whole)[0].reshape(RUNS, ROWS, 3)
     path = path + rng.normal(size=path.shape) * [LAW.position, LAW.position, LAW.heading]
     poses = [log._replace(x=p[:, 0], y=p[:, 1], theta=p[:, 2]) for log, p in zip(runs, path, strict=True)]
@@ -68,6 +72,20 @@ def test_a_payload_is_placed_where_it_came():
     held = (("payload_change", "instant"),)
     first = refit(data, begin, nominal.starts, ("payload_change",), held, most=4)
     assert abs(at_best_instant(data, first)[place] - 13.3) < 0.3
+
+
+def test_commands_that_came_late_are_found_one_by_one(plain):
+    data, nominal = nominal_fit(windows_of(VECTOR, late=2))
+    found = find_lost(data, nominal)
+    assert found.gain > 100.0
+    assert 0.02 < found.share < 0.4
+    moved = np.any(found.arrived != data.windows.command, axis=2)
+    true = np.zeros_like(moved)
+    for row in range(50, ROWS, 50):
+        true[row : row + 2] = True
+    assert np.mean(moved[true]) > 0.5  # small changes cannot be told
+    assert np.mean(moved[~true]) < 0.01
+    assert find_lost(*plain).gain < 4.0
 
 
 def test_rhythms_of_wheels_are_found_with_their_price(plain):
