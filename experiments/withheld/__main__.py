@@ -9,6 +9,7 @@ import tempfile
 import jaxident as ji
 
 from . import baselines, seal
+from .collect import collect
 from .diagnose import DEFAULT, diagnose
 from .draw import draw
 from .judge import judge
@@ -32,6 +33,10 @@ def _seal(options) -> None:
 
 def _diagnose(options) -> None:
     diagnose(options.cases, options.found, options.command, options.jobs)
+
+
+def _collect(options) -> None:
+    collect(options.found, options.out)
 
 
 def _baselines(options) -> None:
@@ -85,6 +90,13 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("--set", nargs="+", choices=COUNTS, required=True)
     one.add_argument("--seed", type=int, required=True)
     step("seal", _seal, "replace ANSWERS by SEALED/SEAL and SEALED/answers.sealed", "answers", "sealed", "key")
+    step(
+        "collect",
+        _collect,
+        "OUT/case_NN.json and OUT/table.md of diagnoses whose answers are elsewhere",
+        "found",
+        "out",
+    )
     runs(step("diagnose", _diagnose, "diagnose every case once, each in its own process", "cases", "found"))
     step("baselines", _baselines, "FOUND/METHOD for every baseline", "cases", "found")
     one = step("score", _score, "open the answers and write table and pictures to OUT", "out")

@@ -69,7 +69,8 @@ def search_effects(windows: Windows, use: Array, nominal: Solution, law: Law, *,
     _try(found, data, found[()].solution, [n for n in _with_look_alikes(scores) if (n,) not in found], ())
     selected = _grow(found, data)
     solution = found[selected].solution
-    again = resized(solution, data, responses, again, sized)
+    if selected != best.effects:
+        again = resized(solution, data, responses, again, sized)
     terms, law = unexplained(data, solution, responses, again, sized)
     return Finding(data, law, found[()].solution, found, selected, terms)
 
