@@ -1,5 +1,7 @@
-"""`python -m experiments.withheld.worker OUT CASE...`: `jaxident diagnose` on case after case in one process, which keeps
-what it compiled; OUT/NAME/process.json tells exit code, seconds and the last lines of stderr of each."""
+"""`python -m experiments.withheld.worker OUT CASE...`: `jaxident diagnose` on case after case in one process.
+
+It keeps what it compiled. OUT/NAME/process.json tells exit code, seconds and the last lines of stderr of each.
+"""
 
 import contextlib
 import io
