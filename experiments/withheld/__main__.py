@@ -47,7 +47,11 @@ def _score(options) -> None:
     """Open the answers, sealed or plain, and judge every method's folder."""
     text = seal.unseal(options.sealed, options.key) if options.sealed else options.answers.read_bytes()
     folders = dict(each.split("=", 1) for each in options.found)
-    judge(json.loads(text)["cases"], {k: pathlib.Path(v) for k, v in folders.items()}, options.out, not options.quick)
+    answers, found = json.loads(text)["cases"], {k: pathlib.Path(v) for k, v in folders.items()}
+    if options.partial:
+        first = next(iter(found.values()))
+        answers = {name: answer for name, answer in answers.items() if (first / name / "process.json").exists()}
+    judge(answers, found, options.out, not options.quick)
 
 
 def _all(options) -> None:
@@ -105,6 +109,7 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("--sealed", **path)
     one.add_argument("--key", **path)
     one.add_argument("--quick", action="store_true", help="without the shrink on fresh runs")
+    one.add_argument("--partial", action="store_true", help="leave out cases that the first method has not come to yet")
     one = step("all", _all, "everything in one go; what was drawn or diagnosed in OUT is kept", "out")
     one.add_argument("--set", nargs="+", choices=COUNTS, default=["sealed", "sealed_engine"])
     one.add_argument("--seed", type=int)

@@ -91,20 +91,19 @@ class Shrink(NamedTuple):
 
 
 def shrink_of(refitted: Array, after: Array, floor: Floor, seed: int = 0) -> Shrink:
-    """The shrink from errors (windows, 3) before and after, with an interval by resampled windows and replays."""
+    """The shrink from errors (windows, 3) before and after, with an interval by resampled windows; none where the gap
+    before does not stand out, neither from replays of noise nor from one resample to the next."""
     kept = np.isfinite(refitted).all(axis=1) & np.isfinite(after).all(axis=1)
     refitted, after = refitted[kept].mean(axis=1), after[kept].mean(axis=1)
     if not len(refitted) or refitted.mean() <= np.quantile(floor.replays, 0.95):
         return Shrink(None, None)
-    rng = np.random.default_rng(seed)
-    picks = _blocks(rng, len(refitted))
-    # a floor per resample: its own spread is that of noise in as many windows
+    picks = _blocks(np.random.default_rng(seed), len(refitted))
     top, bottom = after[picks].mean(axis=1) - floor.value, refitted[picks].mean(axis=1) - floor.value
-    found = 1.0 - top / np.maximum(bottom, 1e-9)
-    low, high = np.quantile(found, [0.5 - LEVEL / 2, 0.5 + LEVEL / 2])
-    return Shrink(
-        float(1.0 - (after.mean() - floor.value) / (refitted.mean() - floor.value)), (float(low), float(high))
-    )
+    if np.quantile(bottom, 0.5 - LEVEL / 2) <= 0.0:
+        return Shrink(None, None)
+    low, high = np.quantile(1.0 - top / np.maximum(bottom, 1e-9), [0.5 - LEVEL / 2, 0.5 + LEVEL / 2])
+    whole = 1.0 - (after.mean() - floor.value) / (refitted.mean() - floor.value)
+    return Shrink(float(whole), (float(low), float(high)))
 
 
 def interval(errors: Array) -> tuple[float, float]:

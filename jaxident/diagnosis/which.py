@@ -22,6 +22,9 @@ PENALTY = 4.0
 ENOUGH = 9.0
 """Gain beyond the penalty that claims an effect. With it a coordinate that does nothing gains as much once in three
 million times (chi-squared at 26), if the noise law is right; the rest is room for a law that is not quite."""
+FORM = 0.01
+"""Part of all that is explained which every further effect must bring: a robot's own form of an effect is never quite
+that of the catalogue, and what it leaves looks like another one."""
 MOST_EFFECTS = 3
 
 
@@ -34,8 +37,9 @@ class Candidate(NamedTuple):
 
     @property
     def evidence(self) -> float:
-        """Gain less the price of its coordinates."""
-        return self.gain - PENALTY * sum(len(COORDINATES[name]) for name in self.effects)
+        """Gain less the price of its coordinates, and of every effect beyond the first."""
+        price = PENALTY * sum(len(COORDINATES[name]) for name in self.effects)
+        return self.gain - price - FORM * max(self.gain, 0.0) * max(len(self.effects) - 1, 0)
 
 
 class Finding(NamedTuple):

@@ -37,6 +37,13 @@ def test_without_a_gap_no_shrink_is_told():
     assert shrink_of(errors(rng, 1.0), errors(rng, 1.0), floor(rng, 1.1)) == (None, None)
 
 
+def test_one_window_alone_makes_no_gap():
+    before = errors(np.random.default_rng(6), 1.0)
+    before[3] *= 300.0
+    assert before.mean() > 2.0
+    assert shrink_of(before, before, floor(np.random.default_rng(7))) == (None, None)
+
+
 def test_unseen_windows_are_left_out():
     rng = np.random.default_rng(3)
     before, after = errors(rng, 30.0), errors(rng, 1.0)

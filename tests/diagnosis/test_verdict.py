@@ -49,6 +49,15 @@ def test_effects_nearly_as_good_are_named_together():
     )
 
 
+def test_a_further_effect_must_bring_a_part_of_all_that_is_explained():
+    def evidence(gain):
+        return Candidate(("slope", "turn_loss"), None, gain).evidence
+
+    first = Candidate(("slope",), None, 10000.0).evidence
+    assert evidence(10060.0) < first
+    assert evidence(10150.0) > first
+
+
 def test_what_the_corrector_explains_beside_a_poor_effect_is_unknown():
     term = (Term("drive", "v^3 in the acceleration along"), 400.0)
     found = finding({("slope",): 300.0}, ("slope",), [term])
