@@ -25,10 +25,11 @@ DRAWS = 400
 class Answers(NamedTuple):
     """products (n, n): Gram matrix of whitened answers of the poses, nominal parameters and start states projected out.
     own: by effect its columns, one per coordinate, or that at typical size where it has no derivative at neutral;
-    typical: by effect the column of its typical size."""
+    parts: how much of each of these a faint effect has; typical: by effect the column of its typical size."""
 
     products: Any
     own: dict[str, list[int]]
+    parts: dict[str, list[float]]
     typical: dict[str, int]
 
 
@@ -42,12 +43,12 @@ class Replay(NamedTuple):
 
 def answers(data: Data, nominal: Solution, largest: float, duration: float) -> Answers:
     """How the poses answer to every effect. Commands are over `largest`; duration [s] of all runs."""
-    smooth = {
-        name: [PLACES[name, c.name] for c in COORDINATES[name] if (name, c.name) not in SHAPES] for name in SMOOTH
-    }
+    sized = {name: [c.name for c in COORDINATES[name] if (name, c.name) not in SHAPES] for name in SMOOTH}
+    smooth = {name: [PLACES[name, key] for key in keys] for name, keys in sized.items()}
     places = [place for own in smooth.values() for place in own]
     linear = linearise(nominal.vector, nominal.starts, data.windows, [*nominal.places, *places])
-    vectors = np.stack([_typical(nominal.vector, name, largest, duration) for name in COORDINATES])
+    sizes = {name: _typical(name, largest, duration) for name in COORDINATES}
+    vectors = np.stack([seeded(nominal.vector, name, size) for name, size in sizes.items()])
     starts = np.broadcast_to(nominal.starts, (len(vectors), *nominal.starts.shape))
     change = np.moveaxis(nominal.linear.residual - follow(vectors, starts, data.windows), 0, -1)
     columns = np.concatenate([linear.slopes, change], axis=2)[data.use]
@@ -55,7 +56,8 @@ def answers(data: Data, nominal: Solution, largest: float, duration: float) -> A
     order = {place: k for k, place in enumerate(places)}
     typical = {name: len(places) + k for k, name in enumerate(COORDINATES)}
     own = {name: [order[p] for p in smooth[name]] if name in smooth else [typical[name]] for name in COORDINATES}
-    return Answers(_without(products, len(nominal.places)), own, typical)
+    parts = {name: [sizes[name][key] for key in sized[name]] if name in sized else [1.0] for name in COORDINATES}
+    return Answers(_without(products, len(nominal.places)), own, parts, typical)
 
 
 def visible(found: Answers) -> dict[str, float]:
@@ -69,14 +71,15 @@ def replay(found: Answers, seed: int = 0) -> Replay:
     rng = np.random.default_rng(seed)
     gains = visible(found)
     names = tuple(name for name, gain in gains.items() if gain > 1e-3)
+    faint = {name: found.products[:, found.own[name]] @ found.parts[name] for name in names}
+    power = {name: 0.5 * float(faint[name][found.own[name]] @ found.parts[name]) for name in names}
     values, vectors = np.linalg.eigh(found.products)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     table = np.zeros((1 + len(names), 1 + len(names)))
     for row, hidden in enumerate(("", *names)):
         cross = root @ rng.normal(size=(len(values), DRAWS if hidden else 10 * DRAWS))
         if hidden:
-            size = np.sqrt(FAINT / gains[hidden])
-            cross += size * found.products[:, [found.typical[hidden]]]
+            cross += np.sqrt(FAINT / max(power[hidden], 1e-12)) * faint[hidden][:, None]
         evidence = np.stack([_evidence(found, name, cross) for name in names])
         named = np.where(evidence.max(axis=0) > ENOUGH, 1 + evidence.argmax(axis=0), 0)
         table[row] = np.bincount(named, minlength=len(table)) / len(named)
@@ -92,13 +95,13 @@ def _evidence(found: Answers, name: str, cross: Array) -> np.ndarray:
     return 0.5 * np.sum(right * np.linalg.solve(matrix, right), axis=0) - PENALTY * len(COORDINATES[name])
 
 
-def _typical(vector: Array, name: str, largest: float, duration: float) -> np.ndarray:
-    """A vector with an effect at its typical size."""
+def _typical(name: str, largest: float, duration: float) -> dict[str, float]:
+    """The coordinates of an effect at its typical size."""
     typical = CATALOGUE[name].typical()
     if name == "payload_change":
         typical["instant"] = 0.5 * duration
     factors = unit_factors(name, largest)
-    return seeded(vector, name, from_catalogue(name, {key: value / factors[key] for key, value in typical.items()}))
+    return from_catalogue(name, {key: value / factors[key] for key, value in typical.items()})
 
 
 def _without(products: Array, count: int) -> np.ndarray:

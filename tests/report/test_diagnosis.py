@@ -56,6 +56,18 @@ def test_effects_of_the_camera_alone_tell_no_shrink():
     assert lead(found).endswith("no shrink is told.")
 
 
+def test_lost_commands_tell_no_shrink():
+    found = made_up("no_gap")._replace(verdict="effects", selected=("lost_commands",))
+    assert "which commands will be lost" in lead(found)
+
+
+def test_replays_are_told_with_what_they_miss():
+    part = section(diagnosis_page(made_up("effects"), "runs"), "What this input could have shown")
+    told = plain_spaces(" ".join(block for block in part.blocks if isinstance(block, str)))
+    assert "without any effect 1 % claim one; each of 2 effects, made faint, is named in 84 % on average" in told
+    assert "Named in fewer than 80 %: motor lag." in told
+
+
 def test_regions_are_in_the_users_unit():
     (regions, sites) = tables(section(diagnosis_page(made_up("effects"), "runs"), "Where it lies"))
     assert regions.rows[0][:3] == ("right command [unit]", 0.5 * LARGEST, 1.0 * LARGEST)
