@@ -41,8 +41,9 @@ class Replay(NamedTuple):
     named: Any
 
 
-def answers(data: Data, nominal: Solution, largest: float, duration: float) -> Answers:
-    """How the poses answer to every effect. Commands are over `largest`; duration [s] of all runs."""
+def answers(data: Data, nominal: Solution, largest: float) -> Answers:
+    """How the poses answer to every effect; commands are over `largest`."""
+    duration = float(data.windows.session[-1] + data.windows.t[-1, -1])
     sized = {name: [c.name for c in COORDINATES[name] if (name, c.name) not in SHAPES] for name in SMOOTH}
     smooth = {name: [PLACES[name, key] for key in keys] for name, keys in sized.items()}
     places = [place for own in smooth.values() for place in own]

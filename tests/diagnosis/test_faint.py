@@ -109,7 +109,7 @@ def test_rhythms_of_wheels_are_found_with_their_price(plain):
 
 def test_answers_are_what_least_squares_leaves_of_them(plain):
     data, nominal = plain
-    found = answers(data, nominal, 1.0, RUNS * ROWS * STEP)
+    found = answers(data, nominal, 1.0)
     vector = nominal.vector.copy()
     vector[PLACES["turn_loss", "loss"]] = CATALOGUE["turn_loss"].typical()["loss"]
     change = nominal.linear.residual - follow(vector[None], nominal.starts[None], data.windows)[0]
@@ -128,7 +128,7 @@ def test_answers_are_what_least_squares_leaves_of_them(plain):
 
 def test_replays_keep_false_claims_rare_and_name_what_is_hidden(plain):
     data, nominal = plain
-    result = replay(answers(data, nominal, 1.0, RUNS * ROWS * STEP), 3)
+    result = replay(answers(data, nominal, 1.0), 3)
     np.testing.assert_allclose(result.named.sum(axis=1), 1.0)
     assert result.named[0, 0] > 0.97
     assert np.mean(np.diagonal(result.named)[1:]) > 0.7
