@@ -10,7 +10,7 @@ from jaxident.diagnosis.lost import find_lost
 from jaxident.diagnosis.measure import Gap, measure
 from jaxident.diagnosis.prepare import Prepared, prepare, repaired
 from jaxident.diagnosis.replay import Replay, answers, replay, visible
-from jaxident.diagnosis.simulator import inspect_simulator, shared
+from jaxident.diagnosis.simulator import check_units, inspect_simulator, shared
 from jaxident.diagnosis.verdict import Judgement, judge
 from jaxident.diagnosis.where import Place
 from jaxident.diagnosis.which import ENOUGH, PENALTY, Finding, search_effects
@@ -77,14 +77,14 @@ def diagnose(
     the robot has and the simulator lacks), or identified from the logs. horizon [s] (default 1, of 20 to 60 rows). The
     runs keep apart: every third, from the second on, serves the gap and its shrink alone. seed: of the replays of noise
     and the shuffles behind intervals; nothing else is drawn. Needs double precision and a minute. InputError for logs
-    that say nothing.
-    """
+    that say nothing, and for a simulator in other units."""
     require_float64("diagnose")
     if sim is not None and model is not None:
         raise InputError("give the simulator's logs or a model, not both: each is the nominal model to judge")
+    if sim is not None:
+        check_units(sim, logs)
     given = None if model is None else translate.to_coordinates(model, logs)
-    prepared = prepare(logs, horizon, given)
-    prepared, finding = search(prepared)
+    prepared, finding = search(prepare(logs, horizon, given))
     simulator = None if sim is None else inspect_simulator(sim, prepared, finding)
     told = given if simulator is None else simulator.vector
     extra = direct_evidence(prepared, finding)

@@ -8,7 +8,13 @@ import numpy as np
 from jaxident.diagnosis.noise import Law
 from jaxident.diagnosis.prepare import Prepared, prepare
 from jaxident.diagnosis.which import Finding, search_effects
-from jaxident.log import Log
+from jaxident.errors import InputError
+from jaxident.log import Log, join
+
+STRIDE = 10
+"""Rows over which speeds are taken: camera noise hardly counts."""
+UNITS = 15.0
+"""Ratio of speeds beyond which no two robots that are meant to be the same differ."""
 
 
 class Simulator(NamedTuple):
@@ -16,6 +22,33 @@ class Simulator(NamedTuple):
 
     vector: Any
     effects: tuple[str, ...]
+
+
+def check_units(sim: Log | Sequence[Log], logs: Log | Sequence[Log]) -> None:
+    """InputError where a simulator's robot moves so much faster or slower for the same commands, or turns, that the two
+    are in different units: metres and millimetres, radians and degrees, commands in parts and in per cent."""
+    theirs, own = _answers(join(sim)), _answers(join(logs))
+    for name, unit, a, b in zip(("moves", "turns"), ("lengths", "angles"), theirs, own, strict=True):
+        ratio = a / max(b, 1e-12)
+        if not 1.0 / UNITS < ratio < UNITS:
+            raise InputError(
+                f"for the same commands the simulator {name} {ratio:.3g} times as fast as the robot: are {unit} and "
+                "commands in the same units?"
+            )
+
+
+def _answers(log: Log) -> tuple[float, float]:
+    """Typical speed and turn rate over the size of the commands."""
+    seen = np.isfinite(log.x) & np.isfinite(log.y) & np.isfinite(log.theta)
+    runs = [run for run in Log(*(np.asarray(column)[seen] for column in log)).runs() if len(run.t) > STRIDE]
+    if not runs:
+        return 1.0, 1.0
+    time = np.concatenate([run.t[STRIDE:] - run.t[:-STRIDE] for run in runs])
+    moved = np.concatenate([np.hypot(*(p[STRIDE:] - p[:-STRIDE] for p in (run.x, run.y))) for run in runs])
+    # as they stand: unwrapping takes radians for granted, and the median forgives where they wrap
+    turn = np.concatenate([np.abs(run.theta[STRIDE:] - run.theta[:-STRIDE]) for run in runs])
+    command = float(np.nanmean(np.abs(np.stack(log.command)))) + 1e-12
+    return float(np.mean(moved / time)) / command, float(np.median(turn / time)) / command
 
 
 def inspect_simulator(sim: Log | Sequence[Log], prepared: Prepared, finding: Finding) -> Simulator:
