@@ -28,7 +28,7 @@ def command(model, between, samples, limit, out, seed, json_file):
     Example: jaxident plan model.json --between transport_delay,motor_lag --limit 0.8 --out next.csv
     """
     start_jax()
-    from jaxident.diagnosis.next_run import plan
+    from jaxident.diagnosis.planning.next_run import plan
     from jaxident.files.logs import write_log
     from jaxident.files.models import load_model
 

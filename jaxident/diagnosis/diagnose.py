@@ -4,16 +4,16 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from jaxident.diagnosis import translate
-from jaxident.diagnosis.direct import direct_effects, direct_evidence
-from jaxident.diagnosis.gap import Shrink
-from jaxident.diagnosis.lost import find_lost
-from jaxident.diagnosis.measure import Gap, measure
+from jaxident.diagnosis.causes.direct import direct_effects, direct_evidence
+from jaxident.diagnosis.causes.lost import find_lost
+from jaxident.diagnosis.causes.which import ENOUGH, PENALTY, Finding, search_effects
+from jaxident.diagnosis.extent.gap import Shrink
+from jaxident.diagnosis.extent.measure import Gap, measure
+from jaxident.diagnosis.extent.where import Place
 from jaxident.diagnosis.prepare import Prepared, prepare, repaired
 from jaxident.diagnosis.replay import Replay, answers, replay, visible
 from jaxident.diagnosis.simulator import check_units, inspect_simulator, shared
 from jaxident.diagnosis.verdict import Judgement, judge
-from jaxident.diagnosis.where import Place
-from jaxident.diagnosis.which import ENOUGH, PENALTY, Finding, search_effects
 from jaxident.errors import InputError
 from jaxident.log import Log
 from jaxident.numerics import require_float64

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.responses import Responses
-from jaxident.diagnosis.windows import Windows
+from jaxident.diagnosis.motion.responses import Responses
+from jaxident.diagnosis.motion.windows import Windows
 
 MOST_STEPS = 12
 SAMPLE, ROWS = 60, 20

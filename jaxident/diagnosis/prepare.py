@@ -7,13 +7,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.coordinates import neutral_vector, nominal_vector
-from jaxident.diagnosis.linear import START_STATES
-from jaxident.diagnosis.lost import Lost
+from jaxident.diagnosis.causes.lost import Lost
+from jaxident.diagnosis.causes.search import Data, Solution, refit
+from jaxident.diagnosis.motion.coordinates import neutral_vector, nominal_vector
+from jaxident.diagnosis.motion.linear import START_STATES
+from jaxident.diagnosis.motion.responses import respond
+from jaxident.diagnosis.motion.windows import Windows, cut
 from jaxident.diagnosis.noise import Law, first_law, size_noise, white_whitener
-from jaxident.diagnosis.responses import respond
-from jaxident.diagnosis.search import Data, Solution, refit
-from jaxident.diagnosis.windows import Windows, cut
 from jaxident.errors import InputError
 from jaxident.estimation.checks import check_informative
 from jaxident.estimation.maximum_likelihood import begin

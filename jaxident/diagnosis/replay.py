@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.coordinates import COORDINATES, PLACES, SHAPES, SMOOTH, from_catalogue, unit_factors
-from jaxident.diagnosis.linear import follow, gram, linearise, normal
-from jaxident.diagnosis.scores import seeded
-from jaxident.diagnosis.search import Data, Solution
-from jaxident.diagnosis.which import ENOUGH, PENALTY
+from jaxident.diagnosis.causes.scores import seeded
+from jaxident.diagnosis.causes.search import Data, Solution
+from jaxident.diagnosis.causes.which import ENOUGH, PENALTY
+from jaxident.diagnosis.motion.coordinates import COORDINATES, PLACES, SHAPES, SMOOTH, from_catalogue, unit_factors
+from jaxident.diagnosis.motion.linear import follow, gram, linearise, normal
 from jaxident.effects.catalogue import CATALOGUE
 
 FAINT = 40.0

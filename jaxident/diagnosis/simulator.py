@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from jaxident.diagnosis.causes.which import Finding, search_effects
 from jaxident.diagnosis.noise import Law
 from jaxident.diagnosis.prepare import Prepared, prepare
-from jaxident.diagnosis.which import Finding, search_effects
 from jaxident.errors import InputError
 from jaxident.log import Log, join
 

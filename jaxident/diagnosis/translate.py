@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.coordinates import (
+from jaxident.diagnosis.causes.search import Solution
+from jaxident.diagnosis.motion.coordinates import (
     COORDINATES,
     NOMINAL,
     PLACES,
@@ -17,7 +18,6 @@ from jaxident.diagnosis.coordinates import (
 )
 from jaxident.diagnosis.noise import Law
 from jaxident.diagnosis.prepare import Prepared
-from jaxident.diagnosis.search import Solution
 from jaxident.errors import InputError
 from jaxident.log import Log, join
 from jaxident.robot.drive import Physical

@@ -4,9 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxident.diagnosis.gap import interval
-from jaxident.diagnosis.measure import Gap
-from jaxident.diagnosis.which import ENOUGH, Finding
+from jaxident.diagnosis.causes.which import ENOUGH, Finding
+from jaxident.diagnosis.extent.gap import interval
+from jaxident.diagnosis.extent.measure import Gap
 from jaxident.effects.catalogue import CATALOGUE, SITES
 
 TEMPERATURE = 2.0

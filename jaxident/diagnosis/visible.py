@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from jaxident.diagnosis.coordinates import COORDINATES, SHAPES, from_catalogue, to_catalogue
-from jaxident.diagnosis.which import ENOUGH
+from jaxident.diagnosis.causes.which import ENOUGH
+from jaxident.diagnosis.motion.coordinates import COORDINATES, SHAPES, from_catalogue, to_catalogue
 from jaxident.effects.catalogue import CATALOGUE
 
 ALL_OR_NOTHING = ("input_saturation",)

@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from jaxident.diagnosis.diagnose import Diagnosis, Gap
+from jaxident.diagnosis.extent.where import OF_COMMANDS, Region
 from jaxident.diagnosis.replay import Replay
-from jaxident.diagnosis.where import OF_COMMANDS, Region
 from jaxident.effects.catalogue import CATALOGUE
 
 SCHEMA = "jaxident.diagnosis/1"

@@ -5,12 +5,12 @@ from collections.abc import Iterable
 import numpy as np
 
 from jaxident import plot
-from jaxident.diagnosis.coordinates import COORDINATES
+from jaxident.diagnosis.causes.which import ENOUGH, PENALTY, Candidate
 from jaxident.diagnosis.diagnose import Diagnosis
+from jaxident.diagnosis.motion.coordinates import COORDINATES
 from jaxident.diagnosis.replay import DRAWS, FAINT, Replay
 from jaxident.diagnosis.verdict import BELIEVABLE, EXCESS, excess_of, slip_of_drive
 from jaxident.diagnosis.visible import smallest_sizes
-from jaxident.diagnosis.which import ENOUGH, PENALTY, Candidate
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.report.page import Figure, Section, Table
 from jaxident.report.words import EFFECTS, chance, number, parameters, percent, plain, together

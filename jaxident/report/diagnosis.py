@@ -6,7 +6,7 @@ import numpy as np
 
 from jaxident import plot
 from jaxident.diagnosis.diagnose import DIFFERENT, Diagnosis, Parameter
-from jaxident.diagnosis.gap import CHANNELS, interval
+from jaxident.diagnosis.extent.gap import CHANNELS, interval
 from jaxident.report import causes, words
 from jaxident.report.page import Figure, Page, Section, Table
 from jaxident.report.words import NOMINAL, SITES, SPACE, VARIABLES, chance, measured, number, percent, plain, together

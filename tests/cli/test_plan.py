@@ -9,7 +9,7 @@ import numpy as np
 from click.testing import CliRunner
 
 from jaxident.cli.plan import command
-from jaxident.diagnosis import next_run
+from jaxident.diagnosis.planning import next_run
 from jaxident.files.logs import read_log
 
 

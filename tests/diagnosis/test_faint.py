@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from jaxident.diagnosis.coordinates import COORDINATES, PLACES, neutral_vector, nominal_vector
-from jaxident.diagnosis.linear import explained, follow, gram
-from jaxident.diagnosis.lost import find_lost
+from jaxident.diagnosis.causes.lost import find_lost
+from jaxident.diagnosis.causes.rhythm import rhythms
+from jaxident.diagnosis.causes.scores import at_best_instant
+from jaxident.diagnosis.causes.search import Data, refit
+from jaxident.diagnosis.causes.steps import likely_steps
+from jaxident.diagnosis.motion.coordinates import COORDINATES, PLACES, neutral_vector, nominal_vector
+from jaxident.diagnosis.motion.linear import explained, follow, gram
+from jaxident.diagnosis.motion.responses import respond
+from jaxident.diagnosis.motion.windows import cut
 from jaxident.diagnosis.noise import Law, white_whitener
 from jaxident.diagnosis.replay import Answers, answers, replay, visible
-from jaxident.diagnosis.responses import respond
-from jaxident.diagnosis.rhythm import rhythms
-from jaxident.diagnosis.scores import at_best_instant
-from jaxident.diagnosis.search import Data, refit
-from jaxident.diagnosis.steps import likely_steps
-from jaxident.diagnosis.windows import cut
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.log import join, make_log
 from jaxident.robot.drive import Physical

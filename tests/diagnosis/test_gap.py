@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from jaxident.diagnosis.gap import Floor, interval, shrink_of
-from jaxident.diagnosis.where import Region, _discoveries, _regions
+from jaxident.diagnosis.extent.gap import Floor, interval, shrink_of
+from jaxident.diagnosis.extent.where import Region, _discoveries, _regions
 
 COUNT = 90
 

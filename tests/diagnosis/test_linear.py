@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from jaxident.diagnosis.coordinates import neutral_vector, nominal_vector
-from jaxident.diagnosis.corrector import pursue
-from jaxident.diagnosis.linear import explained, follow, gram
-from jaxident.diagnosis.responses import answer_to_start
-from jaxident.diagnosis.windows import cut
+from jaxident.diagnosis.causes.corrector import pursue
+from jaxident.diagnosis.motion.coordinates import neutral_vector, nominal_vector
+from jaxident.diagnosis.motion.linear import explained, follow, gram
+from jaxident.diagnosis.motion.responses import answer_to_start
+from jaxident.diagnosis.motion.windows import cut
 from jaxident.log import make_log
 from jaxident.robot.drive import Physical
 

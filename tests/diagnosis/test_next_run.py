@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from jaxident.array_types import AT_REST
-from jaxident.diagnosis import next_run, question
-from jaxident.diagnosis.coordinates import neutral_vector, nominal_vector
-from jaxident.diagnosis.linear import follow
-from jaxident.diagnosis.next_run import plan, separations
+from jaxident.diagnosis.causes.search import Data, refit
+from jaxident.diagnosis.motion.coordinates import neutral_vector, nominal_vector
+from jaxident.diagnosis.motion.linear import follow
+from jaxident.diagnosis.motion.windows import cut, uncut
 from jaxident.diagnosis.noise import Law, whitener_of
+from jaxident.diagnosis.planning import next_run, question
+from jaxident.diagnosis.planning.next_run import plan, separations
+from jaxident.diagnosis.planning.trial_inputs import KINDS, make, vary
 from jaxident.diagnosis.prepare import first_starts
-from jaxident.diagnosis.search import Data, refit
-from jaxident.diagnosis.trial_inputs import KINDS, make, vary
-from jaxident.diagnosis.windows import cut, uncut
 from jaxident.effects.apply import with_effects
 from jaxident.effects.simulate import simulate
 from jaxident.errors import InputError

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from jaxident.diagnosis.motion.responses import answer_to_start, respond
+from jaxident.diagnosis.motion.windows import Windows
 from jaxident.diagnosis.noise import Law, covariance, first_law, size_noise, whitener_of
-from jaxident.diagnosis.responses import answer_to_start, respond
-from jaxident.diagnosis.windows import Windows
 
 ROWS, COUNT, STEP = 45, 60, 0.03
 RATES = np.array([4.0, 5.0])

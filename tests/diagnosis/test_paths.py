@@ -4,7 +4,7 @@ import jax
 import numpy as np
 import pytest
 
-from jaxident.diagnosis.coordinates import (
+from jaxident.diagnosis.motion.coordinates import (
     COORDINATES,
     PLACES,
     SIZE,
@@ -13,9 +13,9 @@ from jaxident.diagnosis.coordinates import (
     neutral_vector,
     nominal_vector,
 )
-from jaxident.diagnosis.inputs import PUSHING
-from jaxident.diagnosis.paths import push_of, report, residuals, track
-from jaxident.diagnosis.windows import cut
+from jaxident.diagnosis.motion.inputs import PUSHING
+from jaxident.diagnosis.motion.paths import push_of, report, residuals, track
+from jaxident.diagnosis.motion.windows import cut
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.simulate import simulate
 from jaxident.log import make_log

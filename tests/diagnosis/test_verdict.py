@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from support.diagnoses import made_up
 
-from jaxident.diagnosis.corrector import Term
+from jaxident.diagnosis.causes.corrector import Term
+from jaxident.diagnosis.causes.which import Candidate
 from jaxident.diagnosis.noise import Law
 from jaxident.diagnosis.verdict import alike, judge, slip_of_drive, unknown_probability
-from jaxident.diagnosis.which import Candidate
 
 NONE: dict[str, float] = {}
 GAP = made_up("effects").gap

@@ -4,16 +4,16 @@ from typing import Any
 
 import numpy as np
 
-from jaxident.diagnosis.coordinates import COORDINATES, NOMINAL
-from jaxident.diagnosis.corrector import Term
+from jaxident.diagnosis.causes.corrector import Term
+from jaxident.diagnosis.causes.which import Candidate, Finding
 from jaxident.diagnosis.diagnose import Diagnosis, Gap, Parameter
-from jaxident.diagnosis.gap import Floor, Shrink
+from jaxident.diagnosis.extent.gap import Floor, Shrink
+from jaxident.diagnosis.extent.where import Place, Region
+from jaxident.diagnosis.motion.coordinates import COORDINATES, NOMINAL
 from jaxident.diagnosis.noise import Law
 from jaxident.diagnosis.prepare import Frames, Prepared
 from jaxident.diagnosis.replay import Replay
 from jaxident.diagnosis.verdict import Cause, Judgement
-from jaxident.diagnosis.where import Place, Region
-from jaxident.diagnosis.which import Candidate, Finding
 from jaxident.effects.catalogue import SITES
 from jaxident.robot.drive import Physical
 from jaxident.robot.model import Effect, Model

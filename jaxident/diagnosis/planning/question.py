@@ -5,7 +5,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.coordinates import (
+from jaxident.diagnosis.causes.scores import seeded, seeds
+from jaxident.diagnosis.motion.coordinates import (
     COORDINATES,
     SHAPES,
     SMOOTH,
@@ -16,7 +17,6 @@ from jaxident.diagnosis.coordinates import (
 )
 from jaxident.diagnosis.noise import Law
 from jaxident.diagnosis.prepare import BURN, horizon_rows
-from jaxident.diagnosis.scores import seeded, seeds
 from jaxident.diagnosis.translate import scaled
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.errors import InputError

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.linear import follow
+from jaxident.diagnosis.motion.linear import follow
+from jaxident.diagnosis.motion.responses import Responses, answer_to_start, modelled_path
+from jaxident.diagnosis.motion.windows import Windows
 from jaxident.diagnosis.noise import Law, covariance
-from jaxident.diagnosis.responses import Responses, answer_to_start, modelled_path
-from jaxident.diagnosis.windows import Windows
 
 REPLAYS, RESAMPLES = 400, 1000
 LEVEL = 0.9

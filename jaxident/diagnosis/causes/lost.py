@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.linear import without_starts
-from jaxident.diagnosis.responses import respond
-from jaxident.diagnosis.search import Data, Solution
+from jaxident.diagnosis.causes.search import Data, Solution
+from jaxident.diagnosis.motion.linear import without_starts
+from jaxident.diagnosis.motion.responses import respond
 
 LATEST = 3
 """Rows by which a change may be late: four in a row are lost too rarely to matter."""

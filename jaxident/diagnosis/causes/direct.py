@@ -1,8 +1,8 @@
 """Effects that show without a refit: commands that never arrived, frames that repeat, outliers, a camera error with a
 memory."""
 
+from jaxident.diagnosis.causes.which import ENOUGH, Finding
 from jaxident.diagnosis.prepare import Prepared
-from jaxident.diagnosis.which import ENOUGH, Finding
 
 
 def direct_evidence(prepared: Prepared, finding: Finding) -> dict[str, float]:

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.corrector import Term, library, pursue
-from jaxident.diagnosis.linear import gram, normal
+from jaxident.diagnosis.causes.corrector import Term, library, pursue
+from jaxident.diagnosis.causes.rhythm import rhythms
+from jaxident.diagnosis.causes.search import Data, Solution
+from jaxident.diagnosis.motion.linear import gram, normal
+from jaxident.diagnosis.motion.responses import Responses
 from jaxident.diagnosis.noise import Law, size_noise, white_whitener, whitener_of
-from jaxident.diagnosis.responses import Responses
-from jaxident.diagnosis.rhythm import rhythms
-from jaxident.diagnosis.search import Data, Solution
 
 SIDES = ("right", "left")
 

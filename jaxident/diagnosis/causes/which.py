@@ -5,13 +5,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.coordinates import COORDINATES, SHAPES
+from jaxident.diagnosis.causes.scores import at_best_instant, beginnings, score
+from jaxident.diagnosis.causes.search import Data, Solution, refit
+from jaxident.diagnosis.causes.unexplained import unexplained
+from jaxident.diagnosis.motion.coordinates import COORDINATES, SHAPES
+from jaxident.diagnosis.motion.responses import Responses, respond
+from jaxident.diagnosis.motion.windows import Windows
 from jaxident.diagnosis.noise import Law, size_noise, whitener_of
-from jaxident.diagnosis.responses import Responses, respond
-from jaxident.diagnosis.scores import at_best_instant, beginnings, score
-from jaxident.diagnosis.search import Data, Solution, refit
-from jaxident.diagnosis.unexplained import unexplained
-from jaxident.diagnosis.windows import Windows
 from jaxident.effects.catalogue import CATALOGUE
 
 REFITS, KEPT = 6, 4

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.windows import Windows
+from jaxident.diagnosis.motion.windows import Windows
 
 
 class Responses(NamedTuple):

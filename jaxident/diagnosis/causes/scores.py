@@ -5,16 +5,16 @@ from collections.abc import Iterable
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.coordinates import (
+from jaxident.diagnosis.causes.search import Data, Solution
+from jaxident.diagnosis.causes.steps import likely_steps
+from jaxident.diagnosis.motion.coordinates import (
     COORDINATES,
     PLACES,
     SHAPES,
     SMOOTH,
     STEPPED,
 )
-from jaxident.diagnosis.linear import explained, follow, gram, left_over, linearise
-from jaxident.diagnosis.search import Data, Solution
-from jaxident.diagnosis.steps import likely_steps
+from jaxident.diagnosis.motion.linear import explained, follow, gram, left_over, linearise
 
 STEPS = np.geomspace(0.02, 0.4, 96)
 """Steps of a quantised command where nothing suggests better ones, in largest commands."""

@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.coordinates import PLACES, STEPPED, free_places, limits
-from jaxident.diagnosis.linear import Linear, follow, gram, linearise, normal
-from jaxident.diagnosis.windows import Windows
+from jaxident.diagnosis.motion.coordinates import PLACES, STEPPED, free_places, limits
+from jaxident.diagnosis.motion.linear import Linear, follow, gram, linearise, normal
+from jaxident.diagnosis.motion.windows import Windows
 
 MOST_STEPS = 12
 ENOUGH = 0.05

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.linear import normal
-from jaxident.diagnosis.responses import Responses, modelled_path
-from jaxident.diagnosis.windows import Windows
+from jaxident.diagnosis.motion.linear import normal
+from jaxident.diagnosis.motion.responses import Responses, modelled_path
+from jaxident.diagnosis.motion.windows import Windows
 
 LAGS = (1, 2, 4, 8)
 MEMORIES = (2.0, 8.0)

@@ -10,9 +10,9 @@ import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array, Pose, Wheels
-from jaxident.diagnosis.coordinates import by_effect
-from jaxident.diagnosis.inputs import SUBSTEPS, Push, pushes
-from jaxident.diagnosis.windows import Windows
+from jaxident.diagnosis.motion.coordinates import by_effect
+from jaxident.diagnosis.motion.inputs import SUBSTEPS, Push, pushes
+from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects import camera
 from jaxident.effects.contact import lateral_slip
 from jaxident.effects.drive import friction_level, mass_offset, quadratic_drag, slide, turn_loss

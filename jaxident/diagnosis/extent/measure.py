@@ -4,14 +4,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxident.diagnosis.gap import Floor, Shrink, errors, floor_of, settle, shrink_of
-from jaxident.diagnosis.linear import follow
+from jaxident.diagnosis.causes.which import Finding
+from jaxident.diagnosis.extent.gap import Floor, Shrink, errors, floor_of, settle, shrink_of
+from jaxident.diagnosis.extent.where import Place, locate
+from jaxident.diagnosis.motion.linear import follow
+from jaxident.diagnosis.motion.responses import respond
+from jaxident.diagnosis.motion.windows import Windows, cut
 from jaxident.diagnosis.noise import Law, white_whitener
 from jaxident.diagnosis.prepare import BURN, Prepared, first_starts
-from jaxident.diagnosis.responses import respond
-from jaxident.diagnosis.where import Place, locate
-from jaxident.diagnosis.which import Finding
-from jaxident.diagnosis.windows import Windows, cut
 from jaxident.log import Log
 
 

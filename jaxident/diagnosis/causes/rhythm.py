@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.linear import without_starts
-from jaxident.diagnosis.responses import Responses, modelled_path
-from jaxident.diagnosis.search import Data, Solution
+from jaxident.diagnosis.causes.search import Data, Solution
+from jaxident.diagnosis.motion.linear import without_starts
+from jaxident.diagnosis.motion.responses import Responses, modelled_path
 
 TURNS = np.geomspace(3.0, 40.0, 64)
 """Radians of the turn per unit of travel, which a wheel at full drive makes in a second."""

@@ -13,14 +13,14 @@ import jax
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.coordinates import NOMINAL
-from jaxident.diagnosis.linear import START_STATES, follow, gram, left_over, linearise
+from jaxident.diagnosis.motion.coordinates import NOMINAL
+from jaxident.diagnosis.motion.linear import START_STATES, follow, gram, left_over, linearise
+from jaxident.diagnosis.motion.paths import track
+from jaxident.diagnosis.motion.responses import respond
+from jaxident.diagnosis.motion.windows import Windows, cut, uncut
 from jaxident.diagnosis.noise import whitener_of
-from jaxident.diagnosis.paths import track
-from jaxident.diagnosis.question import Question, ask, check_names, expected_size, noise_of
-from jaxident.diagnosis.responses import respond
-from jaxident.diagnosis.trial_inputs import ORDINARY, draw, make, vary
-from jaxident.diagnosis.windows import Windows, cut, uncut
+from jaxident.diagnosis.planning.question import Question, ask, check_names, expected_size, noise_of
+from jaxident.diagnosis.planning.trial_inputs import ORDINARY, draw, make, vary
 from jaxident.log import Log, make_log
 from jaxident.numerics import require_float64
 from jaxident.robot.model import Model

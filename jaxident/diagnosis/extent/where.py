@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.gap import CHANNELS
-from jaxident.diagnosis.responses import modelled_path
-from jaxident.diagnosis.windows import Windows
+from jaxident.diagnosis.extent.gap import CHANNELS
+from jaxident.diagnosis.motion.responses import modelled_path
+from jaxident.diagnosis.motion.windows import Windows
 
 OF_COMMANDS = ("u_r", "u_l", "|u|", "largest |u|")
 """Variables in commands over their largest."""

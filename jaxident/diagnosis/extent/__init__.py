@@ -1,0 +1,1 @@
+"""How large the gap is, before and after, and where it lies."""

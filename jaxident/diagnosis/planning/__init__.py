@@ -1,0 +1,1 @@
+"""The input that best tells two effects apart."""
