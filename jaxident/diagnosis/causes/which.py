@@ -1,5 +1,6 @@
 """Which effect: scores of all from the nominal fit, full refits of the best, then a second and a third beside it."""
 
+from collections.abc import Collection
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -8,7 +9,7 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.causes.scores import at_best_instant, beginnings, score
 from jaxident.diagnosis.causes.search import Data, Solution, refit
 from jaxident.diagnosis.causes.unexplained import unexplained
-from jaxident.diagnosis.motion.coordinates import COORDINATES, SHAPES
+from jaxident.diagnosis.motion.coordinates import COORDINATES, NOMINAL, SHAPES, free_places, neutral_vector
 from jaxident.diagnosis.motion.responses import Responses, respond
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.diagnosis.noise import Law, size_noise, whitener_of
@@ -54,24 +55,26 @@ class Finding(NamedTuple):
     terms: list[tuple[Any, float]]
 
 
-def search_effects(windows: Windows, use: Array, nominal: Solution, law: Law, *, sized: bool = True) -> Finding:
+def search_effects(
+    windows: Windows, use: Array, nominal: Solution, law: Law, *, sized: bool = True, without: Collection[str] = ()
+) -> Finding:
     """From the nominal fit under a noise law to a selected set; `use` (boolean, windows) are those that name.
 
     The law is sized again at the best fit, for the nominal one takes what is missing for slip; not so if `sized` is
-    False.
+    False. Effects in `without` are left out, as if the catalogue had no word for them.
     """
     data, responses = whiten(nominal, windows, use, law)
     nominal = refit(data, nominal.vector, nominal.starts, ())
-    scores = score(data, nominal)
+    scores = _scores(data, nominal, without)
     found: dict[tuple[str, ...], Candidate] = {(): Candidate((), nominal, 0.0)}
     _try(found, data, nominal, _with_look_alikes(scores), ())
     best = max(found.values(), key=lambda c: c.evidence)
     again = resized(best.solution, data, responses, law, sized)
     data, responses = whiten(best.solution, windows, use, again)
     found = _again(found, data)
-    scores = score(data, found[()].solution)
+    scores = _scores(data, found[()].solution, without)
     _try(found, data, found[()].solution, [n for n in _with_look_alikes(scores) if (n,) not in found], ())
-    selected = _grow(found, data)
+    selected = _exchange(found, data, _grow(found, data, without), without)
     solution = found[selected].solution
     if selected != best.effects:
         again = resized(solution, data, responses, again, sized)
@@ -126,7 +129,7 @@ def _refit_with_shapes(data: Data, vector: Array, starts: Array, effects: tuple[
     return refit(data, vector, starts, effects)
 
 
-def _grow(found: dict, data: Data) -> tuple[str, ...]:
+def _grow(found: dict, data: Data, without: Collection[str]) -> tuple[str, ...]:
     """Effects accepted one after the other, each for a joint refit that is worth it."""
     selected: tuple[str, ...] = ()
     singles = sorted((c for e, c in found.items() if len(e) == 1), key=lambda c: -c.evidence)
@@ -134,7 +137,7 @@ def _grow(found: dict, data: Data) -> tuple[str, ...]:
         selected = singles[0].effects
     while selected and len(selected) < MOST_EFFECTS:
         now = found[selected]
-        scores = score(data, now.solution)
+        scores = _scores(data, now.solution, without)
         names = [n for n in _ranked(scores) if n not in selected and scores[n] > ENOUGH][:4]
         _try(found, data, now.solution, names, selected)
         more = [c for e, c in found.items() if len(e) == len(selected) + 1]
@@ -145,6 +148,33 @@ def _grow(found: dict, data: Data) -> tuple[str, ...]:
     return selected
 
 
+def _exchange(found: dict, data: Data, selected: tuple[str, ...], without: Collection[str]) -> tuple[str, ...]:
+    """The best set of several when each effect in turn is left out or gives way to another: the first was accepted
+    without knowing the others."""
+    if len(selected) < 2:
+        return selected
+    for name in selected:
+        rest = tuple(other for other in selected if other != name)
+        if not any(set(rest) == set(effects) for effects in found):
+            solution = found[selected].solution
+            vector = neutral_vector(solution.vector[: len(NOMINAL)])
+            for place in free_places(rest):
+                vector[place] = solution.vector[place]
+            reduced = refit(data, vector, solution.starts, rest)
+            found[rest] = Candidate(rest, reduced, found[()].solution.cost - reduced.cost)
+        beside = next(effects for effects in found if set(rest) == set(effects))
+        scores = _scores(data, found[beside].solution, (*without, *selected))
+        known = [set(effects) for effects in found]
+        names = [n for n in _ranked(scores)[:3] if scores[n] > ENOUGH and {*rest, n} not in known]
+        _try(found, data, found[beside].solution, names, beside)
+    best = max(found.values(), key=lambda c: c.evidence)
+    return best.effects if best.evidence > found[selected].evidence else selected
+
+
+def _scores(data: Data, solution: Solution, without: Collection[str]) -> dict[str, float]:
+    return {name: gain for name, gain in score(data, solution).items() if name not in without}
+
+
 def _ranked(scores: dict[str, float]) -> list[str]:
     return sorted(scores, key=lambda name: -(scores[name] - PENALTY * len(COORDINATES[name])))
 
@@ -152,5 +182,5 @@ def _ranked(scores: dict[str, float]) -> list[str]:
 def _with_look_alikes(scores: dict[str, float]) -> list[str]:
     """The best by score, and what the catalogue says the first two are confused with."""
     best = _ranked(scores)[:REFITS]
-    near = [other for name in best[:2] for other in CATALOGUE[name].confused_with if other in COORDINATES]
+    near = [other for name in best[:2] for other in CATALOGUE[name].confused_with if other in scores]
     return list(dict.fromkeys([*best, *near]))

@@ -1,0 +1,61 @@
+"""Every catalogue effect once as an unknown one.
+
+    python -m experiments.withheld.leave_out --cases CASES --answers ANSWERS --out FILE.json
+
+Cases with one hidden effect, diagnosed by a catalogue from which that effect is taken: the verdict should be `unknown`,
+at the right site. Answers must be plain, and the cases of a set to develop on: thresholds may be chosen here.
+"""
+
+import argparse
+import json
+import pathlib
+
+import jaxident as ji
+from jaxident.diagnosis.causes.direct import direct_evidence
+from jaxident.diagnosis.causes.which import search_effects
+from jaxident.diagnosis.diagnose import decide
+from jaxident.diagnosis.extent.measure import measure
+from jaxident.diagnosis.motion.coordinates import COORDINATES
+from jaxident.diagnosis.prepare import prepare
+from jaxident.diagnosis.verdict import judge
+from jaxident.effects import CATALOGUE
+
+from .intervals import wilson
+
+
+def main() -> None:
+    """Diagnose every such case twice, with the effect in the catalogue and without; write what came out."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    for name in ("cases", "answers", "out"):
+        parser.add_argument(f"--{name}", required=True, type=pathlib.Path)
+    options = parser.parse_args()
+    ji.start_jax()
+    answers = json.loads(options.answers.read_text())["cases"]
+    rows = []
+    for name, answer in answers.items():
+        hidden = [effect["name"] for effect in answer["effects"]]
+        if answer["kind"] == "single" and hidden[0] in COORDINATES:
+            rows.append({"case": name, "hidden": hidden[0]} | without(options.cases / name, hidden[0]))
+            print(rows[-1], flush=True)
+    options.out.write_text(json.dumps(rows, indent=1) + "\n")
+    for key in ("unknown", "site"):
+        count = sum(row[key] for row in rows)
+        low, high = wilson(count, len(rows))
+        print(f"{key}: {count} of {len(rows)} (95 % interval {low:.2f} to {high:.2f})")
+
+
+def without(case: pathlib.Path, effect: str) -> dict:
+    """Verdict, what was named, and whether the most probable site is that of the effect that was left out."""
+    logs = [ji.read_log(path) for path in sorted(case.glob("real_*"))]
+    prepared = prepare(logs, None)
+    finding = search_effects(prepared.windows, prepared.naming, prepared.nominal, prepared.law, without=(effect,))
+    gap, _, _ = measure(prepared, finding, None, ())
+    judgement = judge(finding, gap, direct_evidence(prepared, finding))
+    verdict = decide(prepared, judgement, [])
+    site = max(judgement.sites, key=judgement.sites.__getitem__)
+    right = CATALOGUE[effect].site
+    return {"unknown": verdict == "unknown", "verdict": verdict, "named": list(finding.selected), "site": site == right}
+
+
+if __name__ == "__main__":
+    main()
