@@ -20,8 +20,9 @@ SLIP_TIMES = (0.05, 0.2, 0.8)
 CAMERA_TIMES = (0.1, 0.5)
 HOPE = 5.0
 """Times what its last step gained: what a search can still be expected to."""
-WORTH = 6.0
-"""Gain of log-likelihood for which a term is believed: two variances and a correlation time."""
+WORTH, MEMORY_WORTH = 6.0, 20.0
+"""Gain of log-likelihood for which slip is believed, two variances and a correlation time; and a memory of the camera,
+which is claimed as an effect: what a model's form leaves looks like a small one."""
 
 
 class Law(NamedTuple):
@@ -87,18 +88,18 @@ def size_noise(residual: Array, starts: Array, windows: Windows, responses: Resp
     numbers = (3 * every[:, None] + np.arange(3)).ravel()
     given = residual[chosen][:, numbers], starts[chosen][:, numbers], own, part, numbers
     begin = first_law(windows)
-    best = first = _size(given, begin, None, None)
-    slips, memories = [(time, None) for time in SLIP_TIMES], [(None, time) for time in CAMERA_TIMES]
-    found = {}
-    for structure in (*slips, *memories):
-        found[structure] = _size(given, begin, *structure, rival=first.log_likelihood)
-        first = max((first, found[structure]), key=lambda s: s.log_likelihood)
-    slip, memory = (max((found[s] for s in kind), key=lambda s: s.log_likelihood) for kind in (slips, memories))
-    if first.log_likelihood < best.log_likelihood + WORTH:
-        return best.law
-    slip_time, memory_time = slip.law.slip_time, memory.law.coloured_time
-    both = _size(given, begin, slip_time, memory_time, rival=first.log_likelihood + WORTH)
-    return both.law if both.log_likelihood > first.log_likelihood + WORTH else first.law
+    base = _size(given, begin, None, None)
+    slips = [_size(given, begin, time, None, rival=base.log_likelihood) for time in SLIP_TIMES]
+    slip = max(slips, key=lambda s: s.log_likelihood)
+    base = slip if slip.log_likelihood > base.log_likelihood + WORTH else base
+    needed = base.log_likelihood + MEMORY_WORTH
+    memories = [_size(given, begin, None, time, rival=needed) for time in CAMERA_TIMES]
+    memory = max(memories, key=lambda s: s.log_likelihood)
+    rival = max(needed, memory.log_likelihood + WORTH)
+    both = _size(given, begin, slip.law.slip_time, memory.law.coloured_time, rival=rival)
+    if both.log_likelihood > rival:
+        return both.law
+    return memory.law if memory.log_likelihood > needed else base.law
 
 
 def take(windows: Windows, chosen: Array) -> Windows:

@@ -27,8 +27,10 @@ LONGEST, SHORTEST = 60, 20
 """Rows of a horizon where none is asked for: cost grows with their cube, sensitivity with their number."""
 HORIZON = 1.0
 """Horizon [s] where none is asked for."""
-OUTLYING = 7.0
-"""Standard deviations by which a pose leaves both its neighbours before it is an outlier."""
+OUTLYING, LESS_OUTLYING = 7.0, 4.5
+"""Standard deviations by which a pose leaves those nearby before it is an outlier; fewer suffice in a log that has FEW,
+for outliers are not all large."""
+FEW = 3
 
 
 class Frames(NamedTuple):
@@ -84,9 +86,10 @@ def prepare(
         return Prepared(log, largest, windows, naming, horizon, Frames(frozen, frozen), first, law)
     outlying = find_outliers(log, windows, first)
     if outlying.any():
-        windows = cut(blind(log, outlying), BURN + rows)
-        naming = roles(windows)
-        first = rough_fit(windows, naming, first.vector)
+        windows, naming, first = without_rows(log, outlying, first)
+    if outlying.sum() >= FEW:
+        outlying |= find_more_outliers(blind(log, outlying), windows, first)
+        windows, naming, first = without_rows(log, outlying, first)
     responses = respond(np.exp(first.vector[:2]), first.linear.residual, windows)
     law = size_noise(first.linear.residual, first.linear.starts, windows, responses, naming)
     return Prepared(log, largest, windows, naming, horizon, Frames(frozen, outlying), first, law)
@@ -176,8 +179,16 @@ def blind(log: Log, rows: Array) -> Log:
     return log._replace(x=x, y=y, theta=theta)
 
 
+def without_rows(log: Log, rows: Array, fit: Solution) -> tuple[Windows, np.ndarray, Solution]:
+    """Windows, roles and the nominal fit without the poses of some rows, windows as long as those of a fit."""
+    windows = cut(blind(log, rows), fit.linear.residual.shape[1] // 3)
+    naming = roles(windows)
+    return windows, naming, rough_fit(windows, naming, fit.vector)
+
+
 def find_outliers(log: Log, windows: Windows, solution: Solution) -> np.ndarray:
-    """Rows (of the log) whose residual leaves those of both neighbours, which agree with each other."""
+    """Rows (of the log) whose residual leaves those of both neighbours, which agree with each other: strict, for what a
+    model misses must not be taken for outliers."""
     residual = solution.linear.residual.reshape(*np.asarray(windows.step).T.shape, 3)
     seen = np.asarray(windows.seen).T
     middle = residual[:, 1:-1] - 0.5 * (residual[:, 2:] + residual[:, :-2])
@@ -185,9 +196,37 @@ def find_outliers(log: Log, windows: Windows, solution: Solution) -> np.ndarray:
     apart = np.abs(residual[:, 2:] - residual[:, :-2])
     spread = np.array([np.median(np.abs(middle[..., k][whole])) / 0.6745 if whole.any() else 1.0 for k in range(3)])
     lonely = (np.abs(middle) > OUTLYING * spread) & (apart < 0.5 * np.abs(middle))
-    hit = lonely.any(axis=2) & whole
+    window, row = np.nonzero(lonely.any(axis=2) & whole)
     found = np.zeros(len(log.t), bool)
-    begins = np.flatnonzero(np.concatenate([[True], np.asarray(log.run)[1:] != np.asarray(log.run)[:-1]]))
-    for window, row in zip(*np.nonzero(hit), strict=True):
-        found[begins[windows.run[window]] + windows.first[window] + row + 1] = True
+    found[_places(log, windows)[window] + row + 1] = True
     return found
+
+
+def find_more_outliers(log: Log, windows: Windows, solution: Solution) -> np.ndarray:
+    """Rows whose residual leaves those nearby, which mostly agree: smaller outliers, two in a row, and those at the
+    ends of a window; for logs that are known to have some."""
+    residual = solution.linear.residual.reshape(*np.asarray(windows.step).T.shape, 3)
+    rows = [np.flatnonzero(own) for own in np.asarray(windows.seen).T]
+    pairs = [_beside(own[k]) for own, k in zip(residual, rows, strict=True)]
+    apart, near = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
+    spread = np.median(np.abs(apart), axis=0) / 0.6745
+    hit = ((np.abs(apart) > LESS_OUTLYING * spread) & (near < 0.25 * np.abs(apart))).any(axis=1)
+    found = np.zeros(len(log.t), bool)
+    places = _places(log, windows)
+    found[np.concatenate([place + k for place, k in zip(places, rows, strict=True)])[hit]] = True
+    return found
+
+
+def _places(log: Log, windows: Windows) -> np.ndarray:
+    """The row of the log at which each window begins."""
+    begins = np.flatnonzero(np.concatenate([[True], np.asarray(log.run)[1:] != np.asarray(log.run)[:-1]]))
+    return begins[windows.run] + windows.first
+
+
+def _beside(values: Array) -> tuple[np.ndarray, np.ndarray]:
+    """How far each of some values (rows, 3) lies from the median of the five around it, and how far the third nearest
+    of these five does: small where most agree, even if two in a row are wrong."""
+    first = np.clip(np.arange(len(values)) - 2, 0, len(values) - 5)
+    five = values[first[:, None] + np.arange(5)]
+    middle = np.median(five, axis=1)
+    return values - middle, np.sort(np.abs(five - middle[:, None]), axis=1)[:, 2]

@@ -11,7 +11,7 @@ def direct_evidence(prepared: Prepared, finding: Finding) -> dict[str, float]:
     frozen, outlying = int(prepared.frames.frozen.sum()), int(prepared.frames.outlying.sum())
     return {
         "frozen_frames": 10.0 * frozen if frozen >= 3 else 0.0,
-        # normal noise leaves OUTLYING deviations once in 10^11 rows
+        # normal noise lies OUTLYING deviations off once in 10^11 rows
         "outliers": 10.0 * outlying if outlying >= max(3, 1e-4 * rows) else 0.0,
         "lost_commands": prepared.lost[1],
         "coloured_noise": 2.0 * ENOUGH if finding.law.coloured is not None else 0.0,

@@ -15,6 +15,8 @@ from jaxident.diagnosis.motion.responses import respond
 
 LATEST = 3
 """Rows by which a change may be late: four in a row are lost too rarely to matter."""
+FEWEST = 5
+"""Changes that came late below which nothing is said: one or two are as well explained by a pose or two gone wrong."""
 SHARES = np.geomspace(0.005, 0.6, 12)
 """Shares of lost commands that are tried."""
 
@@ -40,9 +42,9 @@ def find_lost(data: Data, solution: Solution) -> Lost:
     for share in SHARES:
         price = np.where(late, -np.log(share) * np.arange(1, LATEST + 1), np.inf)
         found = [_delayed(columns[c], residual[k], price[c]) for k, c in enumerate(own)]
-        kept = sum(len(own[k]) for k in np.flatnonzero(data.use)) * np.log1p(-share)
-        gain = sum(found[k][0] for k in np.flatnonzero(data.use)) + kept
-        if gain > best.gain:
+        used = [(k, *found[k]) for k in np.flatnonzero(data.use)]
+        gain = sum(more + len(own[k]) * np.log1p(-share) for k, more, _ in used)
+        if gain > best.gain and sum(int(np.sum(rows > 0)) for _, _, rows in used) >= FEWEST:
             best = best._replace(share=float(share), gain=float(gain))
             delays = np.concatenate([rows for _, rows in found])
     arrived = np.array(windows.command, float)
