@@ -1,5 +1,7 @@
 """Searches that no derivative serves, and replays: each against what was put in."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from jaxident.diagnosis.motion.linear import explained, follow, gram
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.motion.windows import cut
 from jaxident.diagnosis.noise import Law, white_whitener
+from jaxident.diagnosis.prepare import find_more_outliers, find_outliers
 from jaxident.diagnosis.replay import Answers, answers, replay, visible
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.log import join, make_log
@@ -149,3 +152,30 @@ def test_replays_of_effects_that_answer_apart_are_all_named():
     found = replay(Answers(products, own, parts, typical), 1)
     assert found.effects == tuple(names)
     assert np.all(np.diagonal(found.named)[1:] > 0.95)
+
+
+def test_outliers_are_found_large_ones_first(plain):
+    data, nominal = plain
+    log = SimpleNamespace(t=np.zeros(RUNS * ROWS), run=np.repeat(np.arange(RUNS), ROWS))
+    assert not find_outliers(log, data.windows, nominal).any()
+    residual = nominal.linear.residual.copy().reshape(len(data.windows.run), -1, 3)
+    for window, row in ((2, 20), (5, 11)):
+        residual[window, row, 0] += 20.0 * LAW.position
+    for window, row in ((3, 0), (6, 30), (6, 31)):  # at an end, and two in a row
+        residual[window, row, 1] += 15.0 * LAW.position
+    residual[7, 9, 2] += 6.5 * LAW.heading
+    fit = nominal._replace(linear=nominal.linear._replace(residual=residual.reshape(len(residual), -1)))
+    rows = data.windows.run * ROWS + data.windows.first
+    assert set(np.flatnonzero(find_outliers(log, data.windows, fit))) == {rows[2] + 20, rows[5] + 11}
+    more = set(np.flatnonzero(find_more_outliers(log, data.windows, fit)))
+    assert {rows[3], rows[6] + 30, rows[6] + 31, rows[7] + 9} <= more
+    assert len(more) < 12
+
+
+def test_a_misfit_is_no_outlier():
+    vector = VECTOR.copy()
+    vector[PLACES["transport_delay", "delay"]] = 0.08
+    windows = windows_of(vector)
+    data, nominal = nominal_fit(windows)
+    log = SimpleNamespace(t=np.zeros(RUNS * ROWS), run=np.repeat(np.arange(RUNS), ROWS))
+    assert find_outliers(log, data.windows, nominal).sum() < 3
