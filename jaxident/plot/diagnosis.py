@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import PowerNorm
 from matplotlib.patches import Rectangle
+from matplotlib.ticker import LogLocator
 
 from jaxident.plot import style
 from jaxident.plot.studies import BRIGHT, MAP
@@ -190,6 +191,8 @@ def _spread_out(ax: Axes) -> None:
     ax.set_xscale("log")
     low, high = ax.get_xlim()
     ax.set_xlim(min(low, 0.5 * (low * high) ** 0.5), max(high, 5.0 * (low * high) ** 0.5))
+    decades = np.log10(ax.get_xlim()[1] / ax.get_xlim()[0])
+    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < 2.0 else (1.0,)))
     ax.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     ax.xaxis.set_minor_formatter(lambda value, _: "")
 
