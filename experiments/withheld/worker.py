@@ -6,12 +6,9 @@ It keeps what it compiled. OUT/NAME/process.json tells exit code, seconds and th
 import contextlib
 import io
 import json
-import os
 import pathlib
 import sys
 import time
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the program does, before NumPy is loaded
 
 from jaxident.cli import main
 

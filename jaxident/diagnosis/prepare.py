@@ -28,9 +28,10 @@ LONGEST, SHORTEST = 60, 20
 HORIZON = 1.0
 """Horizon [s] where none is asked for."""
 OUTLYING, LESS_OUTLYING = 7.0, 4.5
-"""Standard deviations by which a pose leaves those nearby before it is an outlier; fewer suffice in a log that has FEW,
-for outliers are not all large."""
+"""Standard deviations by which a pose leaves those nearby before it is an outlier; fewer suffice where a log is known
+to have outliers, for not all are large."""
 FEW = 3
+"""Outliers from which on a log is known to have some."""
 
 
 class Frames(NamedTuple):

@@ -9,15 +9,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.scores import seeded
+from jaxident.diagnosis.causes.scores import differences, seeded, sizes_of
 from jaxident.diagnosis.causes.search import Data, Solution
 from jaxident.diagnosis.causes.which import ENOUGH, PENALTY
-from jaxident.diagnosis.motion.coordinates import COORDINATES, PLACES, SHAPES, SMOOTH, from_catalogue, unit_factors
-from jaxident.diagnosis.motion.linear import follow, gram, linearise, normal
+from jaxident.diagnosis.motion.coordinates import COORDINATES, PLACES, SMOOTH, from_catalogue, unit_factors
+from jaxident.diagnosis.motion.linear import gram, linearise, normal
 from jaxident.effects.catalogue import CATALOGUE
 
 FAINT = 40.0
-"""Expected gain of the replayed effects: three to six times what a claim asks for."""
+"""Expected gain of the replayed effects: two to three times what a claim asks for."""
 DRAWS = 400
 """Replays of each effect; ten times as many of none."""
 
@@ -44,14 +44,12 @@ class Replay(NamedTuple):
 def answers(data: Data, nominal: Solution, largest: float) -> Answers:
     """How the poses answer to every effect; commands are over `largest`."""
     duration = float(data.windows.session[-1] + data.windows.t[-1, -1])
-    sized = {name: [c.name for c in COORDINATES[name] if (name, c.name) not in SHAPES] for name in SMOOTH}
+    sized = {name: [key for _, key in sizes_of(name)] for name in SMOOTH}
     smooth = {name: [PLACES[name, key] for key in keys] for name, keys in sized.items()}
     places = [place for own in smooth.values() for place in own]
     linear = linearise(nominal.vector, nominal.starts, data.windows, [*nominal.places, *places])
     sizes = {name: _typical(name, largest, duration) for name in COORDINATES}
-    vectors = np.stack([seeded(nominal.vector, name, size) for name, size in sizes.items()])
-    starts = np.broadcast_to(nominal.starts, (len(vectors), *nominal.starts.shape))
-    change = np.moveaxis(nominal.linear.residual - follow(vectors, starts, data.windows), 0, -1)
+    change = differences(data, nominal, [seeded(nominal.vector, name, size) for name, size in sizes.items()])
     columns = np.concatenate([linear.slopes, change], axis=2)[data.use]
     products = gram(data.whitener[data.use], columns, linear.starts[data.use]).products.sum(axis=0)
     order = {place: k for k, place in enumerate(places)}

@@ -21,11 +21,13 @@ is this many times what noise could make it at most."""
 BELIEVABLE = 0.025
 """Random slip beyond this part of full drive, at a correlation time of SLOW [s], is a cause nobody has found yet."""
 SLOW = 0.2
+"""Correlation time [s] at which slip is compared."""
 WIDTH = 0.12
 """Of both thresholds, as a logarithm."""
 ALIKE = 6.0
 """Effects whose evidence in place of another falls short of its by less than this cannot be told from it."""
 NOWHERE = {"actuation": 0.2, "drive": 0.4, "contact": 0.4, "time": 0.0, "camera": 0.0}
+"""Sites of a gap that no term of the corrector places."""
 
 
 class Cause(NamedTuple):

@@ -10,6 +10,7 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.search import Data, Solution
+from jaxident.diagnosis.causes.steps import past_zone
 from jaxident.diagnosis.motion.linear import without_starts
 from jaxident.diagnosis.motion.responses import respond
 
@@ -96,13 +97,9 @@ def _whitened(data: Data, solution: Solution, window: Array, row: Array, before:
     responses = respond(np.exp(solution.vector[:2]), linear.residual, windows)
     columns = np.concatenate([responses.along, responses.heading, linear.residual[..., None]], axis=2)
     white, _ = without_starts(data.whitener, columns, linear.starts)
-    rows, dead_zone = responses.along.shape[2], solution.vector[6:8]
-
-    def past_zone(u: Array) -> np.ndarray:
-        return np.sign(u) * np.maximum(np.abs(u) - dead_zone, 0.0)
-
+    rows = responses.along.shape[2]
     now = windows.command[windows.first[window] + row, windows.run[window]]
-    force = (past_zone(before) - past_zone(now)) @ solution.vector[2:6].reshape(2, 2).T
+    force = (past_zone(before, solution) - past_zone(now, solution)) @ solution.vector[2:6].reshape(2, 2).T
     parts = []
     for k in range(LATEST):
         place, within = np.minimum(row + k, rows - 1), (row + k < rows)[:, None]

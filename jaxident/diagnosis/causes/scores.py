@@ -58,14 +58,14 @@ def score(data: Data, solution: Solution) -> dict[str, float]:
     """What each effect promises to explain beyond a solution, its coordinates free: a linear prediction by the
     derivative at neutral, or by the difference that its best seed makes."""
     free = list(solution.places)
-    smooth = {name: [PLACES[pair] for pair in _sizes_of(name) if PLACES[pair] not in free] for name in SMOOTH}
+    smooth = {name: [PLACES[pair] for pair in sizes_of(name) if PLACES[pair] not in free] for name in SMOOTH}
     more = [place for places in smooth.values() for place in places]
     linear = linearise(solution.vector, solution.starts, data.windows, [*free, *more])
     jumps = [
-        (name, seed) for name in COORDINATES if name not in SMOOTH and PLACES[_sizes_of(name)[0]] not in free
+        (name, seed) for name in COORDINATES if name not in SMOOTH and PLACES[sizes_of(name)[0]] not in free
         for seed in _own_seeds(name, data, solution)
     ]  # fmt: skip
-    change = _differences(data, solution, [seeded(solution.vector, *jump) for jump in jumps])
+    change = differences(data, solution, [seeded(solution.vector, *jump) for jump in jumps])
     columns = np.concatenate([linear.slopes, change, linear.residual[..., None]], axis=2)[data.use]
     products = gram(data.whitener[data.use], columns, linear.starts[data.use]).products.sum(axis=0)
     base, column_of = list(range(len(free))), {place: len(free) + k for k, place in enumerate(more)}
@@ -79,12 +79,12 @@ def score(data: Data, solution: Solution) -> dict[str, float]:
     return scores
 
 
-def _sizes_of(name: str) -> list[tuple[str, str]]:
+def sizes_of(name: str) -> list[tuple[str, str]]:
     """The coordinates of an effect that do something alone."""
     return [(name, c.name) for c in COORDINATES[name] if (name, c.name) not in SHAPES]
 
 
-def _differences(data: Data, solution: Solution, vectors: list[np.ndarray]) -> np.ndarray:
+def differences(data: Data, solution: Solution, vectors: list[np.ndarray]) -> np.ndarray:
     """What poses gain when a solution's vector becomes each of some others, (windows, numbers, vectors)."""
     if not vectors:
         return np.zeros((*solution.linear.residual.shape, 0))
@@ -111,7 +111,7 @@ def beginnings(data: Data, solution: Solution, name: str) -> list[np.ndarray]:
 def _promises(data: Data, solution: Solution, name: str, points) -> tuple[list[np.ndarray], list[float]]:
     """Vectors with an effect at some seeds, and the gain that each promises."""
     vectors = [seeded(solution.vector, name, seed) for seed in points]
-    change = _differences(data, solution, vectors)
+    change = differences(data, solution, vectors)
     columns = np.concatenate([solution.linear.slopes, change, solution.linear.residual[..., None]], axis=2)[data.use]
     products = gram(data.whitener[data.use], columns, solution.linear.starts[data.use]).products.sum(axis=0)
     base = list(range(len(solution.places)))

@@ -17,14 +17,10 @@ TEETH = np.arange(2.2, 50.0, 0.08)
 def likely_steps(data: Data, solution: Solution, count: int = 16) -> np.ndarray:
     """The most promising steps (count,), each better than its neighbours, in largest commands."""
     wanted, command = _slopes(data, solution), data.windows.command
-    dead_zone = solution.vector[6:8]
-
-    def past_zone(u: Array) -> np.ndarray:
-        return np.sign(u) * np.maximum(np.abs(u) - dead_zone, 0.0)
-
+    past = past_zone(command, solution)
     promise = np.empty(len(TEETH))
     for k, step in enumerate(1.0 / TEETH):
-        change = past_zone(np.round(command / step) * step) - past_zone(command)
+        change = past_zone(np.round(command / step) * step, solution) - past
         promise[k] = np.sum(wanted * change) / np.sqrt(np.sum(change**2) + 1e-12)
     inside = np.pad(promise, 1, constant_values=-np.inf)
     peaks = np.flatnonzero((promise >= inside[:-2]) & (promise >= inside[2:]))
@@ -42,6 +38,11 @@ def _slopes(data: Data, solution: Solution) -> np.ndarray:
     total = np.zeros(windows.command.shape)
     np.add.at(total, (places, np.broadcast_to(windows.run[:, None], places.shape)), wanted)
     return total
+
+
+def past_zone(command: Array, solution: Solution) -> np.ndarray:
+    """What of commands (..., 2) lies beyond a solution's dead zones."""
+    return np.sign(command) * np.maximum(np.abs(command) - solution.vector[6:8], 0.0)
 
 
 def pulls(data: Data, residual: Array, responses: Responses) -> tuple[np.ndarray, np.ndarray]:

@@ -167,8 +167,8 @@ def _exchange(found: dict, data: Data, selected: tuple[str, ...], without: Colle
         known = [set(effects) for effects in found]
         names = [n for n in _ranked(scores)[:3] if scores[n] > ENOUGH and {*rest, n} not in known]
         _try(found, data, found[beside].solution, names, beside)
-    best = max(found.values(), key=lambda c: c.evidence)
-    return best.effects if best.evidence > found[selected].evidence else selected
+    # a larger set must be worth as much more as when sets grow
+    return max(found.values(), key=lambda c: c.evidence - ENOUGH * len(c.effects)).effects
 
 
 def _scores(data: Data, solution: Solution, without: Collection[str]) -> dict[str, float]:
