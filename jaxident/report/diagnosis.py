@@ -75,7 +75,9 @@ def _deviations(parameter: Parameter) -> float:
 def _shrinks(found: Diagnosis) -> str:
     shrink = found.gap.shrink
     if "lost_commands" in found.selected and not found.finding.selected:
-        return "No model can tell which commands will be lost, so that no shrink is told; errors are under those that arrived."
+        return (
+            "No model can tell which commands will be lost, so that errors count those that arrived, no shrink is told."
+        )
     if not found.finding.selected:
         return "It shows in the camera's poses and leaves the path alone, so that no shrink is told."
     if shrink.value is None or shrink.interval is None:
