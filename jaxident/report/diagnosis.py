@@ -75,9 +75,7 @@ def _deviations(parameter: Parameter) -> float:
 def _shrinks(found: Diagnosis) -> str:
     shrink = found.gap.shrink
     if "lost_commands" in found.selected and not found.finding.selected:
-        return (
-            "No model can tell which commands will be lost, so that errors count those that arrived, no shrink is told."
-        )
+        return "No model can tell which commands will be lost, so that no shrink is told; errors count only the others."
     if not found.finding.selected:
         return "It shows in the camera's poses and leaves the path alone, so that no shrink is told."
     if shrink.value is None or shrink.interval is None:
