@@ -7,8 +7,8 @@ from jaxident.diagnosis import translate
 from jaxident.diagnosis.causes.direct import direct_effects, direct_evidence
 from jaxident.diagnosis.causes.lost import find_lost
 from jaxident.diagnosis.causes.which import ENOUGH, PENALTY, Finding, search_effects
-from jaxident.diagnosis.extent.gap import Shrink
 from jaxident.diagnosis.extent.measure import Gap, measure
+from jaxident.diagnosis.extent.shrink import Shrink
 from jaxident.diagnosis.extent.where import Place
 from jaxident.diagnosis.prepare import Prepared, prepare, repaired
 from jaxident.diagnosis.replay import Replay, answers, replay, visible

@@ -77,21 +77,18 @@ def white_whitener(law: Law, windows: Windows) -> np.ndarray:
     return np.eye(len(scale)) * scale * seen[:, :, None]
 
 
-def size_noise(residual: Array, starts: Array, windows: Windows, responses: Responses, use: Array) -> Law:
+def size_noise(
+    residual: Array, starts: Array, windows: Windows, responses: Responses, use: Array, worth: float = WORTH
+) -> Law:
     """The likeliest law: white, with slip, with a camera memory, each only where it is worth its terms; from residuals
-    (windows, numbers) and derivatives by start states (windows, numbers, 5) of the windows in `use` (boolean)."""
-    chosen = np.flatnonzero(use)
-    chosen = chosen[np.unique(np.linspace(0, len(chosen) - 1, min(SAMPLE, len(chosen))).round().astype(int))]
-    own = take(windows, chosen)
-    part = Responses(*(leaf[chosen] for leaf in responses))
-    every = np.arange(0, len(own.seen), max(1, len(own.seen) // ROWS))
-    numbers = (3 * every[:, None] + np.arange(3)).ravel()
-    given = residual[chosen][:, numbers], starts[chosen][:, numbers], own, part, numbers
+    (windows, numbers) and derivatives by start states (windows, numbers, 5) of the windows in `use` (boolean). worth:
+    the gain for which slip is believed."""
+    given = _sample(residual, starts, windows, responses, use)
     begin = first_law(windows)
     base = _size(given, begin, None, None)
     slips = [_size(given, begin, time, None, rival=base.log_likelihood) for time in SLIP_TIMES]
     slip = max(slips, key=lambda s: s.log_likelihood)
-    base = slip if slip.log_likelihood > base.log_likelihood + WORTH else base
+    base = slip if slip.log_likelihood > base.log_likelihood + worth else base
     needed = base.log_likelihood + MEMORY_WORTH
     memories = [_size(given, begin, None, time, rival=needed) for time in CAMERA_TIMES]
     memory = max(memories, key=lambda s: s.log_likelihood)
@@ -100,6 +97,29 @@ def size_noise(residual: Array, starts: Array, windows: Windows, responses: Resp
     if both.log_likelihood > rival:
         return both.law
     return memory.law if memory.log_likelihood > needed else base.law
+
+
+def doubt_of(
+    law: Law, residual: Array, starts: Array, windows: Windows, responses: Responses, use: Array
+) -> np.ndarray:
+    """Covariance (variances, variances) of the logarithms of a law's variances, by average information from the same
+    numbers as `size_noise`; no variance is known worse than by a factor of about e."""
+    residual, starts, own, part, numbers = _sample(residual, starts, windows, responses, use)
+    parts = _parts(law.slip_time, law.coloured_time, own, part, numbers)
+    theta = np.array([law.position, law.heading, *(law.slip or ()), *(law.coloured or ())]) ** 2
+    curve = _likelihood(residual, starts, parts, theta, _alone(own, numbers))[2]
+    return np.linalg.inv(theta[:, None] * curve * theta + np.eye(len(theta)))
+
+
+def _sample(residual: Array, starts: Array, windows: Windows, responses: Responses, use: Array):
+    """Residuals, derivatives by start states, windows, responses and numbers of those that size the noise."""
+    chosen = np.flatnonzero(use)
+    chosen = chosen[np.unique(np.linspace(0, len(chosen) - 1, min(SAMPLE, len(chosen))).round().astype(int))]
+    own = take(windows, chosen)
+    part = Responses(*(leaf[chosen] for leaf in responses))
+    every = np.arange(0, len(own.seen), max(1, len(own.seen) // ROWS))
+    numbers = (3 * every[:, None] + np.arange(3)).ravel()
+    return residual[chosen][:, numbers], starts[chosen][:, numbers], own, part, numbers
 
 
 def take(windows: Windows, chosen: Array) -> Windows:

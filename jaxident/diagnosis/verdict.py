@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxident.diagnosis.causes.which import ENOUGH, Finding
-from jaxident.diagnosis.extent.gap import interval
 from jaxident.diagnosis.extent.measure import Gap
+from jaxident.diagnosis.extent.shrink import interval
 from jaxident.effects.catalogue import CATALOGUE, SITES
 
 TEMPERATURE = 2.0

@@ -6,7 +6,8 @@ import numpy as np
 
 from jaxident import plot
 from jaxident.diagnosis.diagnose import DIFFERENT, Diagnosis, Parameter
-from jaxident.diagnosis.extent.gap import CHANNELS, interval
+from jaxident.diagnosis.extent.gap import CHANNELS
+from jaxident.diagnosis.extent.shrink import interval
 from jaxident.report import causes, words
 from jaxident.report.page import Figure, Page, Section, Table
 from jaxident.report.words import NOMINAL, SITES, SPACE, VARIABLES, chance, measured, number, percent, plain, together

@@ -2,28 +2,19 @@
 
 import numpy as np
 import pytest
+from support.arcs import along_arcs
 
 from jaxident.diagnosis.motion.responses import answer_to_start, respond
-from jaxident.diagnosis.motion.windows import Windows
-from jaxident.diagnosis.noise import Law, covariance, first_law, size_noise, whitener_of
+from jaxident.diagnosis.noise import Law, _sample, _size, covariance, doubt_of, first_law, size_noise, whitener_of
 
-ROWS, COUNT, STEP = 45, 60, 0.03
+ROWS, COUNT = 45, 60
 RATES = np.array([4.0, 5.0])
 
 
 @pytest.fixture(scope="module")
 def made():
     """Windows along made-up arcs, answers about them."""
-    rng = np.random.default_rng(1)
-    time = np.arange(ROWS)[:, None] * STEP
-    theta = rng.uniform(-3.0, 3.0, COUNT) + rng.uniform(-2.0, 2.0, COUNT) * time
-    v = rng.uniform(0.1, 0.4, COUNT)
-    x, y = np.cumsum(v * STEP * np.cos(theta), axis=0), np.cumsum(v * STEP * np.sin(theta), axis=0)
-    windows = Windows(
-        t=np.arange(ROWS * COUNT)[:, None] * STEP, session=np.zeros(1), command=np.zeros((ROWS * COUNT, 1, 2)),
-        step=np.full((ROWS, COUNT), STEP), pose=np.stack([x, y, theta], axis=-1), seen=np.ones((ROWS, COUNT), bool),
-        run=np.zeros(COUNT, int), first=np.arange(COUNT) * ROWS,
-    )  # fmt: skip
+    windows = along_arcs(ROWS, COUNT)
     nothing = np.zeros((COUNT, 3 * ROWS))
     return windows, respond(RATES, nothing, windows), answer_to_start(RATES, nothing, windows)
 
@@ -71,6 +62,21 @@ def test_camera_memory_is_not_taken_for_slip(made):
     found = sized(law, made, 4)
     assert found.coloured is not None
     np.testing.assert_allclose(found.coloured, law.coloured, rtol=0.4)
+
+
+def test_doubt_is_the_spread_of_the_sizes(made):
+    """24 draws, four variances each: their logarithms miss by as much as said, standard error of the ratio 7 %."""
+    windows, responses, starts = made
+    law, use = Law(5e-4, 4e-3, (0.03, 0.4), 0.2), np.ones(COUNT, bool)
+    factor = np.linalg.cholesky(covariance(law, windows, responses))
+    apart = []
+    for seed in range(24):
+        residual = (factor @ np.random.default_rng(seed).normal(size=(COUNT, 3 * ROWS, 1)))[..., 0]
+        found = _size(_sample(residual, starts, windows, responses, use), law, 0.2, None).law
+        doubt = doubt_of(found, residual, starts, windows, responses, use)
+        sizes = [np.log(np.square([one.position, one.heading, *one.slip])) for one in (found, law)]
+        apart.append((sizes[0] - sizes[1]) / np.sqrt(np.diagonal(doubt)))
+    assert 0.75 < np.sqrt(np.mean(np.square(apart))) < 1.25
 
 
 def test_fourth_differences_size_the_camera(made):

@@ -7,7 +7,8 @@ import numpy as np
 from jaxident.diagnosis.causes.corrector import Term
 from jaxident.diagnosis.causes.which import Candidate, Finding
 from jaxident.diagnosis.diagnose import Diagnosis, Gap, Parameter
-from jaxident.diagnosis.extent.gap import Floor, Shrink
+from jaxident.diagnosis.extent.floor import Floor
+from jaxident.diagnosis.extent.shrink import Shrink
 from jaxident.diagnosis.extent.where import Place, Region
 from jaxident.diagnosis.motion.coordinates import COORDINATES, NOMINAL
 from jaxident.diagnosis.noise import Law

@@ -12,7 +12,7 @@ from jaxident.diagnosis.causes.unexplained import unexplained
 from jaxident.diagnosis.motion.coordinates import COORDINATES, NOMINAL, SHAPES, free_places, neutral_vector
 from jaxident.diagnosis.motion.responses import Responses, respond
 from jaxident.diagnosis.motion.windows import Windows
-from jaxident.diagnosis.noise import Law, size_noise, whitener_of
+from jaxident.diagnosis.noise import WORTH, Law, size_noise, whitener_of
 from jaxident.effects.catalogue import CATALOGUE
 
 REFITS, KEPT = 6, 4
@@ -27,6 +27,9 @@ FORM = 0.01
 """Part of all that is explained which every further effect must bring: a robot's own form of an effect is never quite
 that of the catalogue, and what it leaves looks like another one."""
 MOST_EFFECTS = 3
+LIKELY = 1.0
+"""Gain for which slip enters the law that the gap is held against: a floor without slip that is as likely there as not
+would be too low, and too sure."""
 
 
 class Candidate(NamedTuple):
@@ -76,17 +79,17 @@ def search_effects(
     _try(found, data, found[()].solution, [n for n in _with_look_alikes(scores) if (n,) not in found], ())
     selected = _exchange(found, data, _grow(found, data, without), without)
     solution = found[selected].solution
-    if selected != best.effects:
-        again = resized(solution, data, responses, again, sized)
+    # once more even for the same set: the law before came from a fit under the nominal one's noise, which is too large
+    again = resized(solution, data, responses, again, sized, LIKELY)
     terms, law = unexplained(data, solution, responses, again, sized)
     return Finding(data, law, found[()].solution, found, selected, terms)
 
 
-def resized(solution: Solution, data: Data, responses: Responses, law: Law, sized: bool) -> Law:
-    """The law sized at a solution, or as it was."""
+def resized(solution: Solution, data: Data, responses: Responses, law: Law, sized: bool, worth: float = WORTH) -> Law:
+    """The law sized at a solution, slip believed for some gain, or as it was."""
     if not sized:
         return law
-    return size_noise(solution.linear.residual, solution.linear.starts, data.windows, responses, data.use)
+    return size_noise(solution.linear.residual, solution.linear.starts, data.windows, responses, data.use, worth)
 
 
 def whiten(solution: Solution, windows: Windows, use: Array, law: Law) -> tuple[Data, Responses]:

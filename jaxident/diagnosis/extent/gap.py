@@ -1,10 +1,10 @@
 """How large the gap is on runs used for nothing else: pose error at a horizon against the camera's variance.
 
-Every window starts from a state estimated on its first rows; the floor is what the corrected model itself would show,
-camera, slip and start-state error included, by replay of its noise through the same estimate.
+Every window starts from a state estimated on its first rows, so that its last residual is a weighted sum of all of
+them: `last_weights`.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,64 +14,47 @@ from jaxident.diagnosis.motion.responses import Responses, answer_to_start, mode
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.diagnosis.noise import Law, covariance
 
-REPLAYS, RESAMPLES = 400, 1000
-LEVEL = 0.9
 STEPS = 3
 """Of the search for a window's start state."""
 CHANNELS = ("along", "lateral", "heading")
 
 
-class Floor(NamedTuple):
-    """What the model itself would show: mean, and means over all windows of each replay (replays,); per window and
-    channel (windows, 3)."""
-
-    value: float
-    replays: Any
-    channels: Any
-
-
-def errors(vectors: Array, starts: Array, windows: Windows, law: Law, responses: Responses, burn: int) -> np.ndarray:
-    """Squared pose errors over the camera's variance (models, windows, 3), along, lateral and in heading, at the last
-    row of windows whose start states are estimated from their first `burn` rows; NaN where that row was not seen.
+def last_errors(
+    vectors: Array, starts: Array, windows: Windows, law: Law, responses: Responses, burn: int
+) -> np.ndarray:
+    """Pose errors over the camera's deviations (models, windows, 3), along, lateral and in heading, at the last row of
+    windows whose start states are estimated from their first `burn` rows; NaN where that row was not seen.
     vectors (models, SIZE), starts (models, 5, windows)."""
-    inverse, _ = _early(law, windows, responses, burn)
+    inverse = early_inverse(law, windows, responses, burn)
     starts = np.stack([settle(*pair, windows, inverse) for pair in zip(vectors, starts, strict=True)])
     residual = follow(vectors, starts, windows)
     seen = np.asarray(windows.seen)[-1]
-    return np.stack([np.where(seen[:, None], _turned(found, windows) / _variance(law), np.nan) for found in residual])
-
-
-def floor_of(
-    vector: Array, residual: Array, windows: Windows, law: Law, responses: Responses, burn: int, seed: int = 0
-) -> Floor:
-    """The floor by replay of noise through the linear estimate about the path of a model with some residuals (windows,
-    numbers)."""
-    inverse, rows = _early(law, windows, responses, burn)
-    slope = answer_to_start(np.exp(vector[:2]), residual, windows)
-    early = slope[:, :rows]
-    normal = early.transpose(0, 2, 1) @ inverse @ early
-    gain = np.linalg.solve(normal + 1e-9 * _scale(normal), early.transpose(0, 2, 1) @ inverse)
-    factor = np.linalg.cholesky(covariance(law, windows, responses))
-    weights = factor[:, -3:] - slope[:, -3:] @ gain @ factor[:, :rows]
-    draws = np.random.default_rng(seed).normal(size=(*weights.shape[::2], REPLAYS))
-    replayed = weights @ draws
-    heading = modelled_path(residual, windows)[2][:, -1]
-    turned = _rotate(replayed, heading[:, None]) ** 2 / _variance(law)[None, :, None]
-    seen = np.asarray(windows.seen)[-1]
-    turned = turned[seen]
-    return Floor(float(np.mean(turned)), turned.mean(axis=(0, 1)), turned.mean(axis=2))
+    turned = [in_channels(found[:, -3:, None], found, windows, law)[..., 0] for found in residual]
+    return np.stack([np.where(seen[:, None], one, np.nan) for one in turned])
 
 
 def settle(vector: Array, starts: Array, windows: Windows, inverse: Array) -> np.ndarray:
     """Start states (5, windows) under a vector (SIZE,) that fit the first poses, as many as the inverse covariance
-    (windows, numbers, numbers) of their noise has; from some starts."""
-    starts = np.array(starts)
+    (windows, numbers, numbers) of their noise has; from some starts. Each window keeps the best it has seen: near rest
+    dry friction has corners that a plain step jumps over and back."""
+    best = np.array(starts)
+    found, slope = _by_start(vector, best, windows, inverse.shape[1])
+    damping = np.full(best.shape[1], 1e-9)
     for _ in range(STEPS):
-        found, slope = _by_start(vector, starts, windows, inverse.shape[1])
         normal = slope.transpose(0, 2, 1) @ inverse @ slope
         right = slope.transpose(0, 2, 1) @ inverse @ found[..., None]
-        starts += np.linalg.solve(normal + 1e-9 * _scale(normal), right)[..., 0].T
-    return starts
+        proposed = best + np.linalg.solve(normal + damping[:, None, None] * _scale(normal), right)[..., 0].T
+        new_found, new_slope = _by_start(vector, proposed, windows, inverse.shape[1])
+        better = _squares(new_found, inverse) < _squares(found, inverse)
+        best = np.where(better, proposed, best)
+        found = np.where(better[:, None], new_found, found)
+        slope = np.where(better[:, None, None], new_slope, slope)
+        damping = np.where(better, 0.1 * damping, np.maximum(100.0 * damping, 1e-4))
+    return best
+
+
+def _squares(found: Array, inverse: Array) -> np.ndarray:
+    return np.einsum("wi,wij,wj->w", found, inverse, found)
 
 
 def _by_start(vector: Array, starts: Array, windows: Windows, numbers: int) -> tuple[np.ndarray, np.ndarray]:
@@ -83,71 +66,46 @@ def _by_start(vector: Array, starts: Array, windows: Windows, numbers: int) -> t
     return found[0], np.moveaxis((found[0] - found[1:]) / step[:, None, None], 0, -1)
 
 
-class Shrink(NamedTuple):
-    """shrink = 1 - (after - floor) / (refitted - floor) and its 90 % interval; None where no gap stands out."""
+class Ends(NamedTuple):
+    """What carries numbers of a window (windows, numbers, columns) into its last error: a weight on the first rows
+    (windows, 3, early numbers), which the start state takes."""
 
-    value: float | None
-    interval: tuple[float, float] | None
+    early: np.ndarray
 
-
-def shrink_of(refitted: Array, after: Array, floor: Floor, seed: int = 0) -> Shrink:
-    """The shrink from errors (windows, 3) before and after, with an interval by resampled windows; none where the gap
-    before does not stand out, neither from replays of noise nor from one resample to the next."""
-    kept = np.isfinite(refitted).all(axis=1) & np.isfinite(after).all(axis=1)
-    refitted, after = refitted[kept].mean(axis=1), after[kept].mean(axis=1)
-    if not len(refitted) or refitted.mean() <= np.quantile(floor.replays, 0.95):
-        return Shrink(None, None)
-    picks = _blocks(np.random.default_rng(seed), len(refitted))
-    top, bottom = after[picks].mean(axis=1) - floor.value, refitted[picks].mean(axis=1) - floor.value
-    if np.quantile(bottom, 0.5 - LEVEL / 2) <= 0.0:
-        return Shrink(None, None)
-    low, high = np.quantile(1.0 - top / np.maximum(bottom, 1e-9), [0.5 - LEVEL / 2, 0.5 + LEVEL / 2])
-    whole = 1.0 - (after.mean() - floor.value) / (refitted.mean() - floor.value)
-    return Shrink(float(whole), (float(low), float(high)))
+    def of(self, columns: Array) -> np.ndarray:
+        """Last errors (windows, 3, columns) in x, y, heading after the start state took its part."""
+        return columns[:, -3:] - self.early @ columns[:, : self.early.shape[2]]
 
 
-def interval(errors: Array) -> tuple[float, float]:
-    """90 % interval of a mean of errors (windows, 3) by resampled windows."""
-    mean = errors[np.isfinite(errors).all(axis=1)].mean(axis=1)
-    found = mean[_blocks(np.random.default_rng(2), len(mean))].mean(axis=1)
-    low, high = np.quantile(found, [0.5 - LEVEL / 2, 0.5 + LEVEL / 2])
-    return float(low), float(high)
+def ends_of(vector: Array, residual: Array, windows: Windows, law: Law, responses: Responses, burn: int) -> Ends:
+    """The linear estimate of start states from their first `burn` rows, about the path of a model (SIZE,) with some
+    residuals (windows, numbers)."""
+    inverse = early_inverse(law, windows, responses, burn)
+    slope = answer_to_start(np.exp(vector[:2]), residual, windows)
+    early = slope[:, : inverse.shape[1]]
+    normal = early.transpose(0, 2, 1) @ inverse @ early
+    return Ends(slope[:, -3:] @ np.linalg.solve(normal + 1e-9 * _scale(normal), early.transpose(0, 2, 1) @ inverse))
 
 
-def _blocks(rng, count: int, length: int = 3) -> np.ndarray:
-    """Resampled places (RESAMPLES, count) in blocks: neighbours overlap and share the robot's manoeuvre."""
-    length = min(length, count)
-    starts = rng.integers(0, count, size=(RESAMPLES, -(-count // length)))
-    return ((starts[..., None] + np.arange(length)) % count).reshape(RESAMPLES, -1)[:, :count]
-
-
-def _early(law: Law, windows: Windows, responses: Responses, burn: int) -> tuple[np.ndarray, int]:
+def early_inverse(law: Law, windows: Windows, responses: Responses, burn: int) -> np.ndarray:
     """Inverse covariance of the first rows of windows, rows of unseen poses left out."""
     rows = 3 * burn
     seen = np.repeat(np.asarray(windows.seen).T, 3, axis=1)[:, :rows]
     inverse = np.linalg.inv(covariance(law, windows, responses)[:, :rows, :rows])
-    return inverse * seen[:, :, None] * seen[:, None, :], rows
+    return inverse * seen[:, :, None] * seen[:, None, :]
+
+
+def in_channels(error: Array, residual: Array, windows: Windows, law: Law) -> np.ndarray:
+    """Errors (windows, 3, columns) in x, y, heading as along, lateral, heading over the camera's deviations; at the
+    last row of a model with some residuals (windows, numbers)."""
+    heading = modelled_path(residual, windows)[2][:, -1:]
+    sine, cosine = np.sin(heading), np.cos(heading)
+    x, y, theta = error[:, 0], error[:, 1], error[:, 2]
+    turned = np.stack([cosine * x + sine * y, -sine * x + cosine * y, theta], axis=1)
+    position, angle = law.coloured or (0.0, 0.0)
+    flat = np.hypot(law.position, position)
+    return turned / np.array([flat, flat, np.hypot(law.heading, angle)])[:, None]
 
 
 def _scale(normal: Array) -> np.ndarray:
     return np.eye(5) * np.max(np.diagonal(normal, axis1=1, axis2=2), axis=1)[:, None, None]
-
-
-def _variance(law: Law) -> np.ndarray:
-    """The camera's variance in the three channels."""
-    position, heading = law.coloured or (0.0, 0.0)
-    flat = law.position**2 + position**2
-    return np.array([flat, flat, law.heading**2 + heading**2])
-
-
-def _turned(residual: Array, windows: Windows) -> np.ndarray:
-    """Squared errors (windows, 3) at the last row, along, lateral and in heading."""
-    last = residual[:, -3:, None]
-    return _rotate(last, modelled_path(residual, windows)[2][:, -1:])[..., 0] ** 2
-
-
-def _rotate(error: Array, heading: Array) -> np.ndarray:
-    """Errors (windows, 3, draws) in x, y, heading as along, lateral, heading."""
-    sine, cosine = np.sin(heading), np.cos(heading)
-    x, y, theta = error[:, 0], error[:, 1], error[:, 2]
-    return np.stack([cosine * x + sine * y, -sine * x + cosine * y, theta], axis=1)

@@ -4,13 +4,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from jaxident.diagnosis.causes.search import Solution
 from jaxident.diagnosis.causes.which import Finding
-from jaxident.diagnosis.extent.gap import Floor, Shrink, errors, floor_of, settle, shrink_of
+from jaxident.diagnosis.extent.floor import Floor, floor_of, wander_of
+from jaxident.diagnosis.extent.gap import ends_of, last_errors, settle
+from jaxident.diagnosis.extent.shrink import HIGH, LOW, Shrink, shrink_of
 from jaxident.diagnosis.extent.where import Place, locate
 from jaxident.diagnosis.motion.linear import follow
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.motion.windows import Windows, cut
-from jaxident.diagnosis.noise import Law, white_whitener
+from jaxident.diagnosis.noise import Law, doubt_of, white_whitener
 from jaxident.diagnosis.prepare import BURN, Prepared, first_starts
 from jaxident.log import Log
 
@@ -35,29 +38,32 @@ class Gap(NamedTuple):
 def measure(prepared: Prepared, finding: Finding, given, common, seed: int = 0) -> tuple[Gap, Place, dict[str, Shrink]]:
     """The gap on windows kept for it, before and after, where it lies, and the shrink of each single effect; `given`
     (10,) or (SIZE,) is the model as given, `common` are effects that it has already."""
-    rows = len(prepared.windows.step)
-    windows = judging_windows(prepared, rows)
+    windows = judging_windows(prepared, len(prepared.windows.step))
     law, best = finding.law, finding.candidates[finding.selected].solution
     singles = {e[0]: c for e, c in finding.candidates.items() if len(e) == 1}
     base = finding.candidates.get(common, finding.candidates[()]).solution.vector
     told = base if given is None else np.concatenate([given, finding.nominal.vector[len(given) :]])
     vectors = np.stack([told, base, best.vector, *(c.solution.vector for c in singles.values())])
     responses, residual, starts = _settled(best.vector, windows, law)
-    found = errors(vectors, np.tile(starts, (len(vectors), 1, 1)), windows, law, responses, BURN)
-    replay = floor_of(best.vector, residual, windows, law, responses, BURN, seed)
-    mean = np.nanmean(found, axis=(1, 2))
-    shrinks = {name: shrink_of(found[1], found[3 + k], replay, seed) for k, name in enumerate(singles)}
+    found = last_errors(vectors, np.tile(starts, (len(vectors), 1, 1)), windows, law, responses, BURN) ** 2
+    fitted = respond(np.exp(best.vector[:2]), best.linear.residual, finding.data.windows)
+    doubt = doubt_of(law, best.linear.residual, best.linear.starts, finding.data.windows, fitted, finding.data.use)
+    ends = ends_of(best.vector, residual, windows, law, responses, BURN)
+    replay = floor_of(residual, windows, law, doubt, responses, ends, seed)
+
+    def shrink(squares, solution: Solution) -> Shrink:
+        wander = wander_of(solution, finding.data.windows, law, fitted, BURN, seed)
+        return shrink_of(found[1], squares, replay, wander, seed)
+
+    shrinks = {name: shrink(found[3 + k], c.solution) for k, (name, c) in enumerate(singles.items())}
     weakest = min(singles.values(), key=lambda c: c.gain, default=None)
     placebo = None if weakest is None else (weakest.effects[0], shrinks[weakest.effects[0]])
-    spread = np.quantile(replay.replays, [0.05, 0.95])
-    before, refitted, after = (float(value) for value in mean[:3])
-    gap = Gap(
-        prepared.horizon, before, refitted, after, replay.value, (float(spread[0]), float(spread[1])),
-        shrink_of(found[1], found[2], replay, seed), placebo, found[:3], replay,
-    )  # fmt: skip
-    seen = np.asarray(windows.seen)[-1]
+    low, high = (float(end) for end in np.quantile(replay.replays, [LOW, HIGH]))
+    before, refitted, after = (float(value) for value in np.nanmean(found, axis=(1, 2))[:3])
+    gap = Gap(prepared.horizon, before, refitted, after, replay.value, (low, high), shrink(found[2], best), placebo,
+              found[:3], replay)  # fmt: skip
     floor = np.full(found[1].shape, np.nan)
-    floor[seen] = replay.channels
+    floor[np.asarray(windows.seen)[-1]] = replay.channels
     return gap, locate(found[1], floor, residual, windows, seed), shrinks
 
 
