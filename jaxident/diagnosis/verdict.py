@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jaxident.diagnosis.causes.unexplained import UNEXPLAINED
 from jaxident.diagnosis.causes.which import ENOUGH, Finding
 from jaxident.diagnosis.extent.measure import Gap
 from jaxident.diagnosis.extent.shrink import interval
@@ -11,8 +12,8 @@ from jaxident.effects.catalogue import CATALOGUE, SITES
 
 TEMPERATURE = 2.0
 """Differences of evidence count for half: the noise law and the forms of the effects are never quite right."""
-UNEXPLAINED, SIGNIFICANT = 0.2, 20.0
-"""A gap is unknown where the corrector explains this share of it beyond the best set, and that much of -log p."""
+SIGNIFICANT = 20.0
+"""Fall of -log p that the corrector must bring beyond the best set, besides its share, for a gap to be unknown."""
 SHARPNESS = 0.04, 4.0
 """Width of both thresholds: how slowly probability passes from known to unknown."""
 EXCESS = 2.0
@@ -76,10 +77,8 @@ def unknown_probability(finding: Finding, gap: Gap) -> float:
     """How sure it is that something outside the selected set takes part: terms of the corrector explain more, runs that
     served nothing else are predicted worse than noise allows, or more is called slip than wheels slip."""
     rest = sum(gain for _, gain in finding.terms)
-    gained = finding.candidates[finding.selected].gain
-    share = rest / max(gained + rest, 1e-9)
     large = _logistic((rest - SIGNIFICANT) / SHARPNESS[1])
-    explained = large * _logistic((share - UNEXPLAINED) / SHARPNESS[0])
+    explained = large * _logistic((finding.unexplained - UNEXPLAINED) / SHARPNESS[0])
     beyond = _beyond(excess_of(gap), EXCESS), _beyond(slip_of_drive(finding), BELIEVABLE)
     return 1.0 - (1.0 - explained) * (1.0 - beyond[0]) * (1.0 - beyond[1])
 

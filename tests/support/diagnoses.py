@@ -109,4 +109,4 @@ def _finding(selected: tuple[str, ...], gap: bool, verdict: str) -> Finding:
         gains["transport_delay", "marker_offset"] = 0.82 * size
     candidates = {effects: Candidate(effects, _NOTHING, gain) for effects, gain in gains.items()}
     terms: list[tuple[Any, float]] = [(Term("contact", "|v| w in the speed sideways"), 150.0)] * (verdict == "unknown")
-    return Finding(_NOTHING, _LAW, _NOTHING, candidates, selected, terms)
+    return Finding(_NOTHING, _LAW, _LAW, _NOTHING, candidates, selected, terms)

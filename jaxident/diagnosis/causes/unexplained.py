@@ -14,6 +14,8 @@ from jaxident.diagnosis.motion.responses import Responses
 from jaxident.diagnosis.noise import Law, size_noise, white_whitener, whitener_of
 
 SIDES = ("right", "left")
+UNEXPLAINED = 0.2
+"""A gap is unknown where the corrector explains this share of it beyond the best set."""
 
 
 def unexplained(
@@ -25,7 +27,7 @@ def unexplained(
     noise were white, the law is sized again at what they leave, and only then do they count; not so if not `sized`.
     """
     terms, answers = _terms(data, solution, responses)
-    found, _ = _choose(data, data.whitener, solution, terms, answers)
+    found, _ = _choose(data, whitener_of(law, data.windows, responses), solution, terms, answers)
     if sized and law != Law(law.position, law.heading):
         _, left = _choose(data, white_whitener(law, data.windows), solution, terms, answers)
         again = size_noise(left, solution.linear.starts, data.windows, responses, data.use)

@@ -47,15 +47,23 @@ class Candidate(NamedTuple):
 
 
 class Finding(NamedTuple):
-    """Where the search ended: data under the final noise law, the nominal fit, all candidates of every stage by their
-    effects, the selected set, and terms of the corrector with what each still explains."""
+    """Where the search ended: data under the noise law of the search; the law beside the corrector's terms, and the
+    likeliest one without them, which takes what they explain for noise; the nominal fit, all candidates of every stage
+    by their effects, the selected set, and terms of the corrector with what each still explains."""
 
     data: Data
     law: Law
+    likely: Law
     nominal: Solution
     candidates: dict[tuple[str, ...], Candidate]
     selected: tuple[str, ...]
     terms: list[tuple[Any, float]]
+
+    @property
+    def unexplained(self) -> float:
+        """The terms' share of all that is explained."""
+        rest = sum(gain for _, gain in self.terms)
+        return rest / max(self.candidates[self.selected].gain + rest, 1e-9)
 
 
 def search_effects(
@@ -81,8 +89,8 @@ def search_effects(
     solution = found[selected].solution
     # once more even for the same set: the law before came from a fit under the nominal one's noise, which is too large
     again = resized(solution, data, responses, again, sized, LIKELY)
-    terms, law = unexplained(data, solution, responses, again, sized)
-    return Finding(data, law, found[()].solution, found, selected, terms)
+    terms, beside = unexplained(data, solution, responses, again, sized)
+    return Finding(data, beside, again, found[()].solution, found, selected, terms)
 
 
 def resized(solution: Solution, data: Data, responses: Responses, law: Law, sized: bool, worth: float = WORTH) -> Law:

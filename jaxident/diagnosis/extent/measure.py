@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.diagnosis.causes.search import Solution
+from jaxident.diagnosis.causes.unexplained import UNEXPLAINED
 from jaxident.diagnosis.causes.which import Finding
 from jaxident.diagnosis.extent.floor import Floor, floor_of, wander_of
 from jaxident.diagnosis.extent.gap import ends_of, last_errors, settle
@@ -39,7 +40,8 @@ def measure(prepared: Prepared, finding: Finding, given, common, seed: int = 0) 
     """The gap on windows kept for it, before and after, where it lies, and the shrink of each single effect; `given`
     (10,) or (SIZE,) is the model as given, `common` are effects that it has already."""
     windows = judging_windows(prepared, len(prepared.windows.step))
-    law, best = finding.law, finding.candidates[finding.selected].solution
+    law = finding.law if finding.unexplained > UNEXPLAINED else finding.likely
+    best = finding.candidates[finding.selected].solution
     singles = {e[0]: c for e, c in finding.candidates.items() if len(e) == 1}
     base = finding.candidates.get(common, finding.candidates[()]).solution.vector
     told = base if given is None else np.concatenate([given, finding.nominal.vector[len(given) :]])
