@@ -37,7 +37,7 @@ class SeveralPerOption(click.Command):
 @click.command(cls=SeveralPerOption)
 @click.argument("logs", nargs=-1, required=True, metavar="LOG...")
 @click.option("--sim", multiple=True, metavar="LOG...", help="Logs of your own simulator, after those of the robot.")
-@click.option("--model", metavar="MODEL", help="A nominal model to judge as it stands.")
+@click.option("--model", metavar="MODEL", help="A model to judge as it stands, effects included.")
 @click.option("--horizon", type=click.FloatRange(0, min_open=True), metavar="S", help="Seconds ahead (default: 1).")
 @click.option("--out", default="diagnosis", show_default=True, metavar="DIR", help="The folder to write.")
 @seed_option

@@ -12,7 +12,7 @@ from jaxident.diagnosis.extent.shrink import Shrink
 from jaxident.diagnosis.extent.where import Place
 from jaxident.diagnosis.prepare import Prepared, prepare, repaired
 from jaxident.diagnosis.replay import Replay, answers, replay, visible
-from jaxident.diagnosis.simulator import check_units, inspect_simulator, shared
+from jaxident.diagnosis.simulator import as_simulator, check_units, inspect_simulator, shared
 from jaxident.diagnosis.verdict import Judgement, judge
 from jaxident.errors import InputError
 from jaxident.log import Log
@@ -73,30 +73,30 @@ def diagnose(
 ) -> Diagnosis:
     """The gap between a robot's logs and the nominal model: where, which effect, how far it shrinks.
 
-    The nominal model is `model`, or the one behind the logs `sim` of the user's own simulator (then the answer is what
-    the robot has and the simulator lacks), or identified from the logs. horizon [s] (default 1, of 20 to 60 rows). The
-    runs keep apart: every third, from the second on, serves the gap and its shrink alone. seed: of the replays of noise
-    and the shuffles behind intervals; nothing else is drawn. Needs double precision and a minute. InputError for logs
-    that say nothing, and for a simulator in other units."""
+    The nominal model is `model`, or the one behind the logs `sim` of the user's own simulator, or identified from the
+    logs. Effects that a model or simulator has are no gap: the answer is what the robot has and it lacks. horizon [s]
+    (default 1, of 20 to 60 rows). The runs keep apart: every third, from the second on, serves the gap and its shrink
+    alone. seed: of the replays of noise and the shuffles behind intervals; nothing else is drawn. Needs double
+    precision and a minute. InputError for logs that say nothing, and for a simulator in other units."""
     require_float64("diagnose")
     if sim is not None and model is not None:
         raise InputError("give the simulator's logs or a model, not both: each is the nominal model to judge")
     if sim is not None:
         check_units(sim, logs)
-    given = None if model is None else translate.to_coordinates(model, logs)
-    prepared, finding = search(prepare(logs, horizon, given))
-    simulator = None if sim is None else inspect_simulator(sim, prepared, finding)
-    told = given if simulator is None else simulator.vector
+    simulator = None if model is None else as_simulator(model, logs)
+    prepared, finding = search(prepare(logs, horizon, None if simulator is None else simulator.vector[:10]))
+    simulator = simulator if sim is None else inspect_simulator(sim, prepared, finding)
+    told = None if simulator is None else simulator.vector
     extra = direct_evidence(prepared, finding)
-    common, surplus = shared(finding, simulator)
-    selected = tuple(name for name in finding.selected if name not in common)
-    selected += tuple(name for name, evidence in extra.items() if evidence > ENOUGH)
+    present = (*finding.selected, *(name for name, evidence in extra.items() if evidence > ENOUGH))
+    common, surplus = shared(present, simulator)
+    selected = tuple(name for name in present if name not in common)
     gap, where, shrinks = measure(prepared, finding, told, common, seed)
     judgement = judge(finding, gap, extra, common)
     known = answers(finding.data, finding.nominal, prepared.largest)
     parameters = compare_parameters(prepared, finding, told)
     verdict = decide(prepared, judgement, parameters)
-    best, direct = finding.candidates[finding.selected].solution, direct_effects(prepared, finding, selected)
+    best, direct = finding.candidates[finding.selected].solution, direct_effects(prepared, finding, present)
     corrected = translate.to_model(prepared, best, finding.law, finding.selected, direct)
     nominal = translate.to_model(prepared, finding.nominal, finding.law, ())
     return Diagnosis(verdict, judgement, gap, where, selected if verdict == "effects" else (), parameters,

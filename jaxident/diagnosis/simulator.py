@@ -1,4 +1,4 @@
-"""The user's own simulator, known by its logs alone: its parameters, and the effects that it has already."""
+"""The user's own simulator, known by its logs or as a model: its parameters, and the effects that it has already."""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -8,8 +8,10 @@ import numpy as np
 from jaxident.diagnosis.causes.which import Finding, search_effects
 from jaxident.diagnosis.noise import Law
 from jaxident.diagnosis.prepare import Prepared, prepare
+from jaxident.diagnosis.translate import to_coordinates
 from jaxident.errors import InputError
 from jaxident.log import Log, join
+from jaxident.robot.model import Model
 
 STRIDE = 10
 """Rows over which speeds are taken: camera noise hardly counts."""
@@ -60,9 +62,14 @@ def inspect_simulator(sim: Log | Sequence[Log], prepared: Prepared, finding: Fin
     return Simulator(found.candidates[found.selected].solution.vector, found.selected)
 
 
-def shared(finding: Finding, simulator: Simulator | None) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Effects that robot and simulator both have, and those that the simulator has alone."""
+def as_simulator(model: Model, logs: Log | Sequence[Log]) -> Simulator:
+    """A model as the simulator of some logs' commands."""
+    return Simulator(to_coordinates(model, logs), tuple(effect.name for effect in model.effects))
+
+
+def shared(found: tuple[str, ...], simulator: Simulator | None) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Effects that robot, by what was found, and simulator both have, and those that the simulator has alone."""
     if simulator is None:
         return (), ()
-    common = tuple(name for name in simulator.effects if name in finding.selected)
+    common = tuple(name for name in found if name in simulator.effects)
     return common, tuple(name for name in simulator.effects if name not in common)

@@ -11,14 +11,15 @@ from jaxident.diagnosis.motion.coordinates import (
     COORDINATES,
     NOMINAL,
     PLACES,
+    from_catalogue,
     natural,
+    neutral_vector,
     nominal_vector,
     to_catalogue,
     unit_factors,
 )
 from jaxident.diagnosis.noise import Law
 from jaxident.diagnosis.prepare import Prepared
-from jaxident.errors import InputError
 from jaxident.log import Log, join
 from jaxident.robot.drive import Physical
 from jaxident.robot.model import Effect, Model, Provenance, require_physical
@@ -29,15 +30,19 @@ _POWERS = np.array([0, 0, -1, -1, -1, -1, 1, 1, 0, 0])
 
 
 def to_coordinates(model: Model, logs: Log | Sequence[Log]) -> np.ndarray:
-    """The nominal coordinates (10,) of a model for the commands of some logs over their largest."""
-    if model.effects:
-        raise InputError(
-            f"effect {model.effects[0].name!r}: --model is a nominal model to judge; leave its effects out"
-        )
+    """The coordinates (SIZE,) of a model, its effects included, for the commands of some logs over their largest; what
+    is random in it has none."""
     drive = require_physical(model)
     largest = float(np.nanmax(np.abs(np.stack(join(logs).command))))
     point = nominal_vector(drive, np.asarray(model.dead_zone))
-    return np.concatenate([point[:2], point[2:] / largest ** _POWERS[2:]])
+    vector = neutral_vector(np.concatenate([point[:2], point[2:] / largest ** _POWERS[2:]]))
+    for effect in model.effects:
+        if effect.name in COORDINATES:
+            factors = unit_factors(effect.name, largest)
+            values = from_catalogue(effect.name, {key: v / factors[key] for key, v in effect.parameters.items()})
+            for key, value in values.items():
+                vector[PLACES[effect.name, key]] = value
+    return vector
 
 
 def in_user_units(point: Array, largest: float) -> list[float]:

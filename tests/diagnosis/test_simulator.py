@@ -1,11 +1,14 @@
-"""A simulator in other units than the robot is refused with a word on which."""
+"""A simulator in other units than the robot is refused with a word on which; a model serves as one."""
 
 import numpy as np
 import pytest
 
-from jaxident.diagnosis.simulator import check_units
+from jaxident.diagnosis.motion.coordinates import PLACES, neutral_vector
+from jaxident.diagnosis.simulator import Simulator, as_simulator, check_units, shared
 from jaxident.errors import InputError
 from jaxident.log import make_log
+from jaxident.robot.drive import Physical
+from jaxident.robot.model import Effect, Model
 
 
 def drive(length=1.0, angle=1.0, command=1.0, rows=200):
@@ -33,3 +36,28 @@ def test_the_same_units_pass():
 def test_other_units_are_told(units, words):
     with pytest.raises(InputError, match=words):
         check_units(drive(**units), drive())
+
+
+def test_a_model_with_effects_is_a_simulator():
+    """Commands up to 90 in the user's unit are up to 1 in coordinates: levels shrink by 90, gains grow."""
+    effects = (
+        Effect("input_saturation", {"level": 72.0}),
+        Effect("transport_delay", {"delay": 0.12}),
+        Effect("slope", {"acceleration": 0.2, "direction": np.pi / 2}),
+        Effect("coloured_noise", {"correlation_time": 0.5, "position": 1e-3, "heading": 1e-2}),
+    )
+    gain = np.array([[0.01, 0.01], [0.1, -0.1]])
+    model = Model(0.05, Physical(np.array([2.0, 3.0]), gain, None), np.array([9.0, 4.5]), effects=effects)
+    found = as_simulator(model, drive(command=100.0))
+    expected = neutral_vector(np.concatenate([np.log([2.0, 3.0]), 90.0 * gain.ravel(), [0.1, 0.05, 0.0, 0.0]]))
+    expected[PLACES["input_saturation", "level"]] = 0.8
+    expected[PLACES["transport_delay", "delay"]] = 0.12
+    expected[PLACES["slope", "y"]] = 0.2
+    np.testing.assert_allclose(found.vector, expected, atol=1e-12)
+    assert found.effects == tuple(effect.name for effect in effects)
+
+
+def test_effects_in_common_are_no_gap():
+    simulator = Simulator(np.zeros(3), ("slope", "turn_loss"))
+    assert shared(("transport_delay", "slope"), simulator) == (("slope",), ("turn_loss",))
+    assert shared(("slope",), None) == ((), ())

@@ -11,6 +11,7 @@ from jaxident.diagnosis.extent.floor import Floor, floor_of, wander_of
 from jaxident.diagnosis.extent.gap import ends_of, last_errors, settle
 from jaxident.diagnosis.extent.shrink import HIGH, LOW, Shrink, shrink_of
 from jaxident.diagnosis.extent.where import Place, locate
+from jaxident.diagnosis.motion.coordinates import COORDINATES
 from jaxident.diagnosis.motion.linear import follow
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.motion.windows import Windows, cut
@@ -43,7 +44,7 @@ def measure(prepared: Prepared, finding: Finding, given, common, seed: int = 0) 
     law = finding.law if finding.unexplained > UNEXPLAINED else finding.likely
     best = finding.candidates[finding.selected].solution
     singles = {e[0]: c for e, c in finding.candidates.items() if len(e) == 1}
-    base = finding.candidates.get(common, finding.candidates[()]).solution.vector
+    base = _with(finding, common).vector
     told = base if given is None else np.concatenate([given, finding.nominal.vector[len(given) :]])
     vectors = np.stack([told, base, best.vector, *(c.solution.vector for c in singles.values())])
     responses, residual, starts = _settled(best.vector, windows, law)
@@ -67,6 +68,13 @@ def measure(prepared: Prepared, finding: Finding, given, common, seed: int = 0) 
     floor = np.full(found[1].shape, np.nan)
     floor[np.asarray(windows.seen)[-1]] = replay.channels
     return gap, locate(found[1], floor, residual, windows, seed), shrinks
+
+
+def _with(finding: Finding, common: tuple[str, ...]) -> Solution:
+    """The fit with effects that a simulator has as well, as far as they shape the path; else the nominal one."""
+    wanted = {name for name in common if name in COORDINATES}
+    fits = (c.solution for effects, c in finding.candidates.items() if set(effects) == wanted)
+    return next(fits, finding.nominal)
 
 
 def judging_windows(prepared: Prepared, rows: int) -> Windows:
