@@ -26,7 +26,7 @@ from jaxident.errors import InputError, WorkError
 from jaxident.files.atomic import Target, explained, make_folder, write_text
 from jaxident.files.json_text import format_json, read_json
 from jaxident.study.dataset import FURTHER_AXES, attributes, coordinates, describe, layout, versions
-from jaxident.study.design import AXES, Study
+from jaxident.study.design import Study
 from jaxident.study.engine import Piece, chunk_shape, chunks
 from jaxident.study.trial import Outcome
 
@@ -173,10 +173,10 @@ def _write_skeleton(study: Study, path: pathlib.Path) -> None:
         group.create_array(
             name,
             shape=shape,
-            chunks=chunk_shape(study) + shape[len(AXES) :],
+            chunks=chunk_shape(study) + shape[len(study.axes) :],
             dtype=kind,
             fill_value=None if kind.kind == "i" else float("nan"),
-            attributes={"_ARRAY_DIMENSIONS": [*AXES, *FURTHER_AXES[name]], **attributes(name)},
+            attributes={"_ARRAY_DIMENSIONS": [*study.axes, *FURTHER_AXES[name]], **attributes(name)},
             config={"write_empty_chunks": True},
         )
     zarr.consolidate_metadata(path, zarr_format=2)
