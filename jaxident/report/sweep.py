@@ -140,8 +140,8 @@ def _maps(summary: xarray.Dataset, base: dict[str, int]) -> list[Figure]:
 def _effect_map(share: xarray.DataArray, base: dict[str, int], estimator: str) -> Figure:
     """Errors [%] of an estimator by set of effects and parameter, at the middle noise level."""
     middle = share.sizes["noise"] // 2
-    rest = {key: k for key, k in base.items() if key != "effect"}
-    values = share.isel(rest, noise=middle).transpose("effect", "parameter").values
+    rest = {key: k for key, k in (base | {"noise": middle}).items() if key != "effect"}
+    values = share.isel(rest).transpose("effect", "parameter").values
     symbols = [written(name).symbol for name in DIFFERENCE_ORDER]
     level = f"{1e3 * float(share['noise'][middle]):.3g} mm of camera noise"
     return _map(values, list(share["effect"].values), symbols, f"{estimator}: error [%] by effect, at {level}")

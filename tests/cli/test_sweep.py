@@ -57,6 +57,7 @@ def test_one_trial_alone(swept):
     assert "0 to 11" in run("study.toml", "--out", "out", "--trial", 12, cwd=swept, code=2).stderr
 
 
+@pytest.mark.slow
 def test_an_axis_of_effects(tmp_path):
     text = SMALL_TOML.replace("hold = 3", "hold = 3\neffects = ['none', { transport_delay = { delay = 0.05 } }]")
     (tmp_path / "study.toml").write_text(text)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from support.studies import ROBOT, SMALL, UNDER_EFFECTS
 
-from jaxident.study import bound
 from jaxident.study.dataset import coordinates, describe, study_arrays
 from jaxident.study.design import Candidate
 from jaxident.study.engine import run_one
@@ -53,15 +52,12 @@ def test_effects_share_their_random_numbers(under_effects):
     seed, noise = 4, 1
     where = [np.ravel_multi_index((0, 0, 0, k, 0, 0, noise, seed), UNDER_EFFECTS.shape) for k in range(3)]
     made = [run_one(UNDER_EFFECTS, number)[0] for number in where]
-    made.append(run_one(SMALL, np.ravel_multi_index((0, 0, 0, 0, 0, noise, seed), SMALL.shape))[0])
     draws = [np.stack(one.measured) - np.stack(one.exact) for one in made]
     for other, draw in zip(made[1:], draws[1:], strict=True):
         np.testing.assert_array_equal(other.command.right, made[0].command.right)
         np.testing.assert_array_equal(other.robot.dead_zone, made[0].robot.dead_zone)
         np.testing.assert_allclose(draw, draws[0], rtol=1e-9, atol=1e-13)
-    for one in made[1:3]:
-        assert np.abs(np.stack(one.exact) - np.stack(made[0].exact)).max() > 1e-3
-    np.testing.assert_allclose(np.stack(made[3].exact), np.stack(made[0].exact), rtol=1e-9, atol=1e-12)
+        assert np.abs(np.stack(other.exact) - np.stack(made[0].exact)).max() > 1e-3
     np.testing.assert_allclose(under_effects["estimate"].sel(effect="none"), study_arrays(SMALL)["estimate"], rtol=1e-6)
 
 
@@ -80,10 +76,3 @@ def test_they_come_on_top_of_what_a_robot_has():
     )
     names = [[[effect.name for effect in effects] for effects in robot] for robot in study.in_force]
     assert names == [[[], ["payload_change"]], [["transport_delay"], ["transport_delay", "payload_change"]]]
-
-
-def test_there_is_no_bound_where_one_acts():
-    found = bound.bounds(UNDER_EFFECTS).squeeze()
-    assert found.dims == ("effect", "noise", "parameter")
-    assert np.isfinite(found.isel(effect=0)).all()
-    assert np.isnan(found.isel(effect=slice(1, None))).all()
