@@ -52,13 +52,11 @@ def opened(study: Study, folder: Target) -> Iterator[Store]:
     where study.json is damaged or another process writes there.
     """
     place = pathlib.Path(folder)
-    make_folder(place)
+    make_folder(folder)
     with _alone(place):
         _check_same(study, place)
-        with explained(place):
-            if (place / DONE).exists():
-                os.rename(place / DONE, place / UNDER_WAY)
-            _lay_out(study, place / UNDER_WAY)
+        with explained(place, KEPT):
+            _lay_out(study, place)
             (place / ".chunks").mkdir(exist_ok=True)
         yield Store(place, study, chunks(study))
 
@@ -149,19 +147,23 @@ def _short(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def _lay_out(study: Study, path: pathlib.Path) -> None:
-    """Bring all files but the chunks to what they should be; leftovers of a killed write go."""
-    with tempfile.TemporaryDirectory(prefix=".part-", dir=path.parent) as folder:
+def _lay_out(study: Study, place: pathlib.Path) -> None:
+    """Bring all files but the chunks to what they should be; leftovers of a killed write go. A finished store loses its
+    name only after what takes room on the disk."""
+    path = place / UNDER_WAY
+    with tempfile.TemporaryDirectory(prefix=".part-", dir=place) as folder:
         fresh = pathlib.Path(folder) / "trials.zarr"
         _write_skeleton(study, fresh)
+        if (place / DONE).exists():
+            os.rename(place / DONE, path)
         for source in sorted(entry for entry in fresh.rglob("*") if entry.is_file()):
             target = path / source.relative_to(fresh)
             target.parent.mkdir(parents=True, exist_ok=True)
             if not target.is_file() or target.read_bytes() != source.read_bytes():
                 os.replace(source, target)
-    for left in [*path.rglob("*.partial"), *path.parent.glob(".*.part")]:
+    for left in [*path.rglob("*.partial"), *place.glob(".*.part")]:
         left.unlink()
-    for left in path.parent.glob(".part-*"):
+    for left in place.glob(".part-*"):
         shutil.rmtree(left)
 
 

@@ -191,6 +191,18 @@ def test_a_full_disk_loses_nothing(tmp_path, finished, counted, monkeypatch):
     assert files(tmp_path) == finished
 
 
+def test_a_full_disk_leaves_a_finished_store_its_name(tmp_path, finished, monkeypatch):
+    def full(study, path):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    sweep(SMALL, tmp_path)
+    with monkeypatch.context() as patch:
+        patch.setattr(trials, "_write_skeleton", full)
+        with pytest.raises(WorkError, match=r"No space left .* are kept"):
+            sweep(SMALL, tmp_path)
+    assert files(tmp_path) == finished
+
+
 def test_a_chunk_that_does_not_come_back_is_missed(tmp_path, monkeypatch):
     monkeypatch.setattr(sweeps, "run_locally", lambda study, todo: iter(()))
     with pytest.raises(WorkError, match="12 trials did not come back"):
