@@ -114,7 +114,7 @@ def _curves(summary: xarray.Dataset, at: dict[str, int], name: str) -> Figure:
 
 def _map_text() -> str:
     return (
-        "Root-mean-square error in per cent of the parameter's true value; below stands camera noise in position [mm]."
+        "Root-mean-square error in per cent of the parameter's true value; numbers below a map are camera noise [mm]."
     )
 
 
