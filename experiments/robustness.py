@@ -33,10 +33,9 @@ ESTIMATORS = {"paper": "recursive", "likelihood": "maximum-likelihood"}
 
 
 def study(seeds: int, samples: int, noise: float) -> dict:
-    """The study's content: a robot for each effect and strength, and one without."""
+    """The study's content: one robot under no effect, then under each of the catalogue at each strength."""
     published = ji.load_model("published")
     plain = dataclasses.replace(published, dynamics=published.physical._replace(coupling=None))
-    sets = [{}, *({name: strength} for name in CATALOGUE for strength in STRENGTHS)]
     return {
         "name": "which effects spoil which parameter",
         "seeds": seeds,
@@ -44,19 +43,20 @@ def study(seeds: int, samples: int, noise: float) -> dict:
         "samples": [samples],
         "hold": 10,
         "chunk": 500,
-        "robots": [{"model": plain, "name": "robot", "effects": sets}],
+        "robots": [{"model": plain, "name": "robot"}],
+        "effects": ["none", *({name: list(STRENGTHS)} for name in CATALOGUE)],
         "estimators": [{"method": method, "name": name} for name, method in ESTIMATORS.items()],
     }
 
 
 def rows_of(summary) -> list[dict]:
-    """One row for each effect, strength, estimator and parameter; robots come in the order of the sets."""
-    cell = summary.isel(excitation=0, samples=0, period=0, amplitude=0, noise=0)
+    """One row for each effect, strength, estimator and parameter."""
+    cell = summary.isel(excitation=0, samples=0, robot=0, period=0, amplitude=0, noise=0)
     cases = [("none", 0.0), *((name, strength) for name in CATALOGUE for strength in STRENGTHS)]
     rows = []
     for k, (effect, strength) in enumerate(cases):
         for estimator in ESTIMATORS:
-            at = cell.isel(robot=k).sel(estimator=estimator)
+            at = cell.isel(effect=k).sel(estimator=estimator)
             failed = int(at["failures"].sum())
             for parameter in DIFFERENCE_ORDER:
                 one = at.sel(parameter=parameter)

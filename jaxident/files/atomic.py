@@ -30,8 +30,17 @@ def check_target(path: Target) -> None:
 
 def make_folder(path: Target) -> None:
     """Make a folder and those above it where they are missing; InputError where that cannot be."""
+    if not os.fspath(path):
+        raise InputError("the name of the folder is empty; give one, or . for this folder")
     with explained(path):
-        os.makedirs(path, exist_ok=True)
+        try:
+            os.makedirs(path, exist_ok=True)
+        except (FileExistsError, NotADirectoryError):
+            parts = (pathlib.Path(path), *pathlib.Path(path).parents)
+            file = next((part for part in parts if part.exists() and not part.is_dir()), None)
+            if file is None:
+                raise
+            raise InputError(f"{os.fspath(path)}: {file} is a file; give the name of a folder") from None
 
 
 def write_text(path: Target, text: str) -> None:

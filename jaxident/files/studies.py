@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from jaxident.effects.apply import sized, with_effects
-from jaxident.effects.catalogue import CATALOGUE
+from jaxident.effects.apply import with_effects
 from jaxident.errors import InputError
+from jaxident.files.effect_sets import take_axis, take_sets
 from jaxident.files.models import load_model
 from jaxident.files.schema import take_keys, take_list, take_number, take_object, take_text
 from jaxident.files.source import Source, explained
@@ -31,6 +31,10 @@ noise = [1e-6, 1e-5, 1e-4, 1e-3]                # standard deviation of the came
 samples = [200]                                 # rows of a run
 amplitude = [1.0]                               # largest command
 # period = [0.0333, 0.1]                        # sample period [s]; default: that of the first robot
+# effects = ["none", "turn_loss", { slope = [0.5, 2] }, { name = "sag", supply_sag = { resistance = 0.2 } }]
+                            # what acts on every robot: an effect's name alone is its typical size, a number the
+                            # strength in typical sizes, a list makes an entry of each; else give the parameters
+                            # (`jaxident effects` lists them); several effects in one { } act together
 
 hold = 5                    # samples that a level of the excitation lasts
 heading_per_position = 10.0 # heading noise [rad] for each metre of position noise
@@ -43,8 +47,7 @@ model = "published"         # a robot that comes with the program, or a model fi
 # spread = { gain = 0.2 }   # each seed draws its own robot, this far from the model at most (relative, uniform)
                             # scale and spread take rate, gain, coupling, dead_zone
 # effects = [{}, { motor_lag = 0.5 }, { motor_lag = 1.0 }, { coulomb_friction = { right = 0.05, left = 0.04 } }]
-                            # each set becomes a robot; a number is the strength in typical sizes, else give the
-                            # parameters; `jaxident effects` lists them; {} is the robot without
+                            # of this robot alone: each set becomes a robot; {} is the robot without
 
 [[estimators]]
 method = "batch"            # PAPER section VI
@@ -57,8 +60,8 @@ settings = { setup_samples = 100 }              # also forgetting
 """
 
 _NEEDED = ("seeds", "noise", "robots", "estimators")
-_FREE = ("name", "excitations", "amplitude", "samples", "period", "hold", "heading_per_position", "correlation_time",
-         "chunk")  # fmt: skip
+_FREE = ("name", "excitations", "amplitude", "samples", "period", "effects", "hold", "heading_per_position",
+         "correlation_time", "chunk")  # fmt: skip
 
 
 def read_study(path: Source, *, seed: int = 0) -> Study:
@@ -90,6 +93,7 @@ def study_from_dict(content: Any, name: str = "study", *, seed: int = 0) -> Stud
     given = {
         "name": _if_given(found["name"], take_text, f"{name}: name"),
         "excitations": _axis(found["excitations"], take_text, f"{name}: excitations"),
+        "effects": _if_given(found["effects"], take_axis, f"{name}: effects"),
         "samples": _axis(found["samples"], _whole, f"{name}: samples"),
         **{key: _axis(found[key], take_number, f"{name}: {key}") for key in ("amplitude", "period")},
         **{key: _if_given(found[key], _whole, f"{name}: {key}") for key in ("hold", "chunk")},
@@ -132,7 +136,7 @@ def _candidates(entry: Any, where: str, folder: str) -> list[Candidate]:
     sets = [("", model)]
     if found["effects"] is not None:
         given = take_list(found["effects"], f"{where}: effects")
-        sets = [_with_set(model, one, f"{where}: effects[{k}]") for k, one in enumerate(given)]
+        sets = [each for k, one in enumerate(given) for each in _with_sets(model, one, f"{where}: effects[{k}]")]
         if not sets:
             raise InputError(f"{where}: effects: is empty; it needs at least one set, as [{{}}]")
     return [
@@ -140,26 +144,16 @@ def _candidates(entry: Any, where: str, folder: str) -> list[Candidate]:
     ]
 
 
-def _with_set(model: Model, entry: Any, where: str) -> tuple[str, Model]:
-    """The model with a set of effects, and what that adds to its name."""
-    names, effects = "", []
-    for name, size in take_object(entry, where).items():
-        if name not in CATALOGUE:
-            raise InputError(f"{where}: unknown effect {name!r}; the catalogue has {', '.join(CATALOGUE)}")
-        if isinstance(size, dict):
-            values = {key: take_number(value, f"{where}: {name}.{key}") for key, value in size.items()}
-            names += f" + {name} " + " ".join(f"{key}={value:g}" for key, value in values.items())
-        else:
-            strength = take_number(size, f"{where}: {name}")
-            if strength <= 0.0:
-                raise InputError(f"{where}: {name}: is {strength:g}; a strength is above 0, in typical sizes")
-            values = sized(CATALOGUE[name], strength)
-            names += f" + {name} x{strength:g}"
-        effects.append((name, values))
-    try:
-        return names, with_effects(model, effects)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
+def _with_sets(model: Model, entry: Any, where: str) -> list[tuple[str, Model]]:
+    """The model with each set of effects of an entry, and what that adds to its name."""
+    found = []
+    for one in take_sets(entry, where):
+        try:
+            full = with_effects(model, [(each.effect.name, each.effect.parameters) for each in one])
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from None
+        found.append(("".join(f" + {each.label}" for each in one), full))
+    return found
 
 
 def _model(value: Any, where: str, folder: str) -> tuple[Model, str]:

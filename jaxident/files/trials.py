@@ -26,7 +26,7 @@ from jaxident.errors import InputError, WorkError
 from jaxident.files.atomic import Target, explained, make_folder, write_text
 from jaxident.files.json_text import format_json, read_json
 from jaxident.study.dataset import FURTHER_AXES, attributes, coordinates, describe, layout, versions
-from jaxident.study.design import AXES, Study
+from jaxident.study.design import Study
 from jaxident.study.engine import Piece, chunk_shape, chunks
 from jaxident.study.trial import Outcome
 
@@ -52,13 +52,11 @@ def opened(study: Study, folder: Target) -> Iterator[Store]:
     where study.json is damaged or another process writes there.
     """
     place = pathlib.Path(folder)
-    make_folder(place)
+    make_folder(folder)
     with _alone(place):
         _check_same(study, place)
-        with explained(place):
-            if (place / DONE).exists():
-                os.rename(place / DONE, place / UNDER_WAY)
-            _lay_out(study, place / UNDER_WAY)
+        with explained(place, KEPT):
+            _lay_out(study, place)
             (place / ".chunks").mkdir(exist_ok=True)
         yield Store(place, study, chunks(study))
 
@@ -149,19 +147,23 @@ def _short(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def _lay_out(study: Study, path: pathlib.Path) -> None:
-    """Bring all files but the chunks to what they should be; leftovers of a killed write go."""
-    with tempfile.TemporaryDirectory(prefix=".part-", dir=path.parent) as folder:
+def _lay_out(study: Study, place: pathlib.Path) -> None:
+    """Bring all files but the chunks to what they should be; leftovers of a killed write go. A finished store loses its
+    name only after what takes room on the disk."""
+    path = place / UNDER_WAY
+    with tempfile.TemporaryDirectory(prefix=".part-", dir=place) as folder:
         fresh = pathlib.Path(folder) / "trials.zarr"
         _write_skeleton(study, fresh)
+        if (place / DONE).exists():
+            os.rename(place / DONE, path)
         for source in sorted(entry for entry in fresh.rglob("*") if entry.is_file()):
             target = path / source.relative_to(fresh)
             target.parent.mkdir(parents=True, exist_ok=True)
             if not target.is_file() or target.read_bytes() != source.read_bytes():
                 os.replace(source, target)
-    for left in [*path.rglob("*.partial"), *path.parent.glob(".*.part")]:
+    for left in [*path.rglob("*.partial"), *place.glob(".*.part")]:
         left.unlink()
-    for left in path.parent.glob(".part-*"):
+    for left in place.glob(".part-*"):
         shutil.rmtree(left)
 
 
@@ -173,10 +175,10 @@ def _write_skeleton(study: Study, path: pathlib.Path) -> None:
         group.create_array(
             name,
             shape=shape,
-            chunks=chunk_shape(study) + shape[len(AXES) :],
+            chunks=chunk_shape(study) + shape[len(study.axes) :],
             dtype=kind,
             fill_value=None if kind.kind == "i" else float("nan"),
-            attributes={"_ARRAY_DIMENSIONS": [*AXES, *FURTHER_AXES[name]], **attributes(name)},
+            attributes={"_ARRAY_DIMENSIONS": [*study.axes, *FURTHER_AXES[name]], **attributes(name)},
             config={"write_empty_chunks": True},
         )
     zarr.consolidate_metadata(path, zarr_format=2)

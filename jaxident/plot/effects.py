@@ -41,6 +41,6 @@ def effect_signature(
     axes[0].set_ylabel("over its largest", labelpad=1.0)
     axes[0].set_title(title.replace("_", " "), loc="left", fontsize=style.TEXT, fontweight="bold", pad=3.0)
     handles, labels = axes[0].get_legend_handles_labels()
-    place: Any = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.98), "ncols": 3, "markerscale": 4.0}
+    place: Any = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "ncols": 3, "markerscale": 4.0, "borderpad": 0.0}
     axes[-1].legend(handles, labels, **place, **{**style.LEGEND, "handlelength": 0.8}).set_in_layout(False)
     return axes

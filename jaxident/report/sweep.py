@@ -17,9 +17,10 @@ from jaxident.plot.style import legend_above
 from jaxident.report.page import Figure, Page, Section, Table, write_page
 from jaxident.robot.model import DIFFERENCE_ORDER
 from jaxident.robot.path_length import path_length
-from jaxident.study.design import AXES, Study
+from jaxident.study.dataset import coordinates
+from jaxident.study.design import Study
 from jaxident.study.estimators import REASONS
-from jaxident.study.statistics import BROKEN_ERROR, BROKEN_SHARE, CELLS
+from jaxident.study.statistics import BROKEN_ERROR, BROKEN_SHARE, cell_axes
 from jaxident.study.trial import Outcome, Recording
 
 SHOWN = ("alpha_1", "alpha_2", "delta_21", "dead_zone_r")
@@ -36,7 +37,7 @@ def write_study(study: Study, trials: xarray.Dataset, summary: xarray.Dataset, p
 
 
 def _page(study: Study, trials: xarray.Dataset, summary: xarray.Dataset) -> Page:
-    base = {axis: 0 for axis in CELLS if axis != "noise"}
+    base = {axis: 0 for axis in cell_axes(summary) if axis != "noise"}
     sections = [
         Section("Failures and break-down", [_breakdown_text(), _breakdown_table(summary)]),
         Section("Error against noise", [_where(summary, base), *(_curves(summary, base, name) for name in SHOWN)]),
@@ -51,12 +52,12 @@ def _page(study: Study, trials: xarray.Dataset, summary: xarray.Dataset) -> Page
 def _lead(study: Study, summary: xarray.Dataset) -> str:
     failed = int(summary["failures"].sum())
     every = study.trials * len(study.estimators)
-    axes = ", ".join(f"{n} {_plural(axis, n)}" for axis, n in zip(AXES, study.shape, strict=True) if n > 1)
+    axes = ", ".join(f"{n} {_plural(axis, n)}" for axis, n in zip(study.axes, study.shape, strict=True) if n > 1)
     return f"{study.trials} trials ({axes or 'one each'}), {every} estimates, {failed} of them failed."
 
 
 def _plural(axis: str, count: int) -> str:
-    words = {"samples": "run lengths", "noise": "noise levels"}
+    words = {"samples": "run lengths", "noise": "noise levels", "effect": "sets of effects"}
     return words.get(axis, f"{axis}s") if count > 1 else axis
 
 
@@ -71,7 +72,7 @@ def _breakdown_text() -> str:
 def _breakdown_table(summary: xarray.Dataset) -> Table:
     """A row for each estimator and cell but for the noise: break-down level and failures by reason."""
     failures = summary["failures"].sum("noise")
-    axes = [axis for axis in (*CELLS, "estimator") if axis != "noise"]
+    axes = [axis for axis in (*cell_axes(summary), "estimator") if axis != "noise"]
     told = [axis for axis in axes if axis == "estimator" or summary.sizes[axis] > 1]
     level = summary["breakdown"].transpose(*axes)
     reasons = [str(name) for name in summary["reason"].values if int(failures.sel(reason=name).sum())]
@@ -112,7 +113,9 @@ def _curves(summary: xarray.Dataset, at: dict[str, int], name: str) -> Figure:
 
 
 def _map_text() -> str:
-    return "Root-mean-square error in per cent of the parameter's true value; camera noise in position [mm] below."
+    return (
+        "Root-mean-square error in per cent of the parameter's true value; numbers below a map are camera noise [mm]."
+    )
 
 
 def _maps(summary: xarray.Dataset, base: dict[str, int]) -> list[Figure]:
@@ -129,7 +132,19 @@ def _maps(summary: xarray.Dataset, base: dict[str, int]) -> list[Figure]:
             middle = cell.isel(rest).median("parameter", skipna=False).transpose(axis, "noise").values
             labels = [_entry(summary, axis, k) for k in range(summary.sizes[axis])]
             made.append(_map(middle, labels, noise, f"{one}: error of the median parameter [%], by {axis}"))
+        if "effect" in base:
+            made.append(_effect_map(cell, base, one))
     return made
+
+
+def _effect_map(share: xarray.DataArray, base: dict[str, int], estimator: str) -> Figure:
+    """Errors [%] of an estimator by set of effects and parameter, at the middle noise level."""
+    middle = share.sizes["noise"] // 2
+    rest = {key: k for key, k in (base | {"noise": middle}).items() if key != "effect"}
+    values = share.isel(rest).transpose("effect", "parameter").values
+    symbols = [written(name).symbol for name in DIFFERENCE_ORDER]
+    level = f"{1e3 * float(share['noise'][middle]):.3g} mm of camera noise"
+    return _map(values, list(share["effect"].values), symbols, f"{estimator}: error [%] by effect, at {level}")
 
 
 def _map(values: Any, rows: list[str], columns: list[str], label: str) -> Figure:
@@ -141,14 +156,15 @@ def _map(values: Any, rows: list[str], columns: list[str], label: str) -> Figure
 def _histogram(study: Study, trials: xarray.Dataset, summary: xarray.Dataset, name: str) -> Figure:
     """The errors of a parameter in the first cell, at the middle noise level."""
     middle = len(study.noise) // 2
-    cut = (*(middle if axis == "noise" else 0 for axis in CELLS), slice(0, HISTOGRAM_TRIALS))
+    at = {axis: middle if axis == "noise" else 0 for axis in cell_axes(summary)}
+    cut = (*at.values(), slice(0, HISTOGRAM_TRIALS))
     column = DIFFERENCE_ORDER.index(name)
     truth = np.asarray(trials["truth"].variable[(*cut, column)])
     estimates = np.asarray(trials["estimate"].variable[(*cut, slice(None), column)])
     errors = {choice.name: estimates[:, k] - truth for k, choice in enumerate(study.estimators)}
     bound = None
     if "rmse_over_bound" in summary:
-        cell = summary.isel({axis: middle if axis == "noise" else 0 for axis in CELLS}).sel(parameter=name)
+        cell = summary.isel(at).sel(parameter=name)
         bound = float((cell["rmse"] / cell["rmse_over_bound"]).isel(estimator=0))
     figure, ax = plot.figure(size=(6.3, 2.8))
     plot.error_histogram(errors, label=name, ax=ax, bound=bound)
@@ -203,16 +219,10 @@ def draw_trial(study: Study, number: int, recording: Recording, outcome: Outcome
 
 
 def _title(study: Study, number: int) -> str:
-    index = np.unravel_index(number, study.shape)
-    entries: tuple[Any, ...] = (
-        study.excitations,
-        study.samples,
-        [one.name for one in study.robots],
-        study.period,
-        study.amplitude,
-    )
-    values = [axis[int(k)] for axis, k in zip(entries, index, strict=False)]
+    index, entries = np.unravel_index(number, study.shape), coordinates(study)
+    at = {axis: entries[axis].values[k] for axis, k in zip(study.axes, index, strict=True)}
+    effect = f"effects {at['effect']}, " if "effect" in at else ""
     return (
-        f"trial {number}: {values[0]}, {values[1]} rows, {values[2]}, {values[3]:.4g} s, amplitude {values[4]:g},\n"
-        f"camera noise {1e3 * study.noise[index[5]]:.4g} mm, seed {index[6]}"
+        f"trial {number}: {at['excitation']}, {at['samples']} rows, {at['robot']}, {at['period']:.4g} s, "
+        f"amplitude {at['amplitude']:g},\n{effect}camera noise {1e3 * at['noise']:.4g} mm, seed {at['seed']}"
     )

@@ -15,9 +15,8 @@ from jaxident.estimation.runs import Runs
 from jaxident.numerics import require_float64
 from jaxident.robot.model import DIFFERENCE_ORDER, require_physical
 from jaxident.robot.noise import Noise
-from jaxident.study.design import AXES, Study
+from jaxident.study.design import Study
 from jaxident.study.engine import cells
-from jaxident.study.statistics import CELLS
 from jaxident.study.trial import Cell, commands, draw_robot, seed_keys
 
 SEEDS = 8
@@ -29,7 +28,7 @@ MOST_CELLS = 500
 def bounds(study: Study) -> xarray.DataArray | None:
     """Smallest standard deviation possible on the axes of a summary's cells and `parameter`, in DIFFERENCE_ORDER.
 
-    NaN without noise and for robots with effects, of which no estimator knows. None for a study of more than
+    NaN without noise and where effects are in force, of which no estimator knows. None for a study of more than
     MOST_CELLS cells at one noise level, or with a camera that makes no error in heading. Needs double precision.
     """
     require_float64("bounds")
@@ -40,14 +39,15 @@ def bounds(study: Study) -> xarray.DataArray | None:
         c.model.noise is not None and c.model.noise.slip_along + c.model.noise.slip_heading for c in study.robots
     )
     for place in np.ndindex(study.shape[:-2]):
-        if study.robots[place[CELLS.index("robot")]].model.effects:
+        at = dict(zip(study.axes, place, strict=False))
+        if study.in_force[at["robot"]][at.get("effect", 0)]:
             continue
         levels = np.flatnonzero(noise) if slip else np.flatnonzero(noise)[:1]
         for level in levels:
             found[(*place, level)] = _deviation(study, (*place, level), bool(slip))
         if not slip and len(levels):  # without slip the bound grows as the noise does
             found[place] = found[(*place, levels[0])] * np.where(noise > 0.0, noise / noise[levels[0]], np.nan)[:, None]
-    return xarray.DataArray(found, dims=(*CELLS, "parameter"))
+    return xarray.DataArray(found, dims=(*study.axes[:-1], "parameter"))
 
 
 def _deviation(study: Study, place: tuple[int, ...], slip: bool) -> np.ndarray:
@@ -55,7 +55,7 @@ def _deviation(study: Study, place: tuple[int, ...], slip: bool) -> np.ndarray:
     count = min(SEEDS, study.seeds)
     index = np.stack([np.full(count, k) for k in place] + [np.arange(count)])
     where, base = cells(study, index), jax.random.key(study.seed)
-    kind, rows = study.excitations[place[AXES.index("excitation")]], study.samples[place[AXES.index("samples")]]
+    kind, rows = study.excitations[place[0]], study.samples[place[1]]
     law = Law(coupling=where.robot.coupling is not None, memory=study.correlation_time is not None, slip=slip)
     variances = np.asarray(_variances(base, where, commands(base, where, kind, rows, study.hold), law))
     return np.sqrt(np.mean(np.where(variances > 0.0, variances, np.nan), axis=0))

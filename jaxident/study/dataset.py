@@ -2,7 +2,7 @@
 
 import json
 import platform
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from typing import Any
 
@@ -10,8 +10,8 @@ import jax
 import numpy as np
 import xarray
 
-from jaxident.robot.model import DIFFERENCE_ORDER
-from jaxident.study.design import AXES, PARTS, Study, check_study
+from jaxident.robot.model import DIFFERENCE_ORDER, Effect
+from jaxident.study.design import PARTS, Study, check_study
 from jaxident.study.engine import chunks, run_locally
 from jaxident.study.estimators import REASONS, settings_of
 from jaxident.study.trial import Outcome
@@ -22,7 +22,7 @@ FURTHER_AXES = {
     "truth": ("parameter",),
     "reason": ("estimator",),
 }
-"""The variables of a study, fields of `Outcome`, and their axes after AXES."""
+"""The variables of a study, fields of `Outcome`, and their axes after those of the trials."""
 
 _MEANING: dict[str, dict[str, Any]] = {
     "estimate": {"long_name": "estimated parameter, NaN where the estimator failed"},
@@ -46,7 +46,8 @@ def study_arrays(study: Study) -> xarray.Dataset:
     for number, outcome in run_locally(study, range(len(cut))):
         for name, part in outcome._asdict().items():
             arrays[name][cut[number].cut] = part
-    made = xarray.Dataset({name: (AXES + FURTHER_AXES[name], array, _MEANING[name]) for name, array in arrays.items()})
+    axes = study.axes
+    made = xarray.Dataset({name: (axes + FURTHER_AXES[name], array, _MEANING[name]) for name, array in arrays.items()})
     return made.assign_coords(coordinates(study).coords).assign_attrs(coordinates(study).attrs)
 
 
@@ -84,6 +85,8 @@ def coordinates(study: Study) -> xarray.Dataset:
         "parameter": ("parameter", list(DIFFERENCE_ORDER), {"long_name": "as in a model file"}),
         "unit": ("parameter", [_unit(name) for name in DIFFERENCE_ORDER], {}),
     }
+    if study.effects:
+        entries["effect"] = ("effect", [one.name for one in study.effects], {"long_name": "effects added to the robot"})
     return xarray.Dataset(coords=entries, attrs=provenance(study))
 
 
@@ -111,7 +114,9 @@ def describe(study: Study) -> dict[str, Any]:
         for one in study.robots
     ]
     estimators = [{"name": one.name, "method": one.method, **settings_of(one)} for one in study.estimators]
-    return plain | {"robots": robots, "estimators": estimators}
+    plain |= {"robots": robots, "estimators": estimators}
+    added = [{"name": one.name, "effects": _sizes(one.effects)} for one in study.effects]
+    return {key: value for key, value in plain.items() if key != "effects"} | ({"effects": added} if added else {})
 
 
 def _parts(model: Any) -> dict[str, Any]:
@@ -119,8 +124,11 @@ def _parts(model: Any) -> dict[str, Any]:
     lists = {key: None if part is None else np.asarray(part, float).tolist() for key, part in drive._asdict().items()}
     slip = None if noise is None else [float(noise.slip_along), float(noise.slip_heading)]
     plain = lists | {"dead_zone": np.asarray(model.dead_zone, float).tolist(), "slip": slip}
-    effects = {effect.name: {key: float(v) for key, v in effect.parameters.items()} for effect in model.effects}
-    return plain | ({"effects": effects} if effects else {})
+    return plain | ({"effects": _sizes(model.effects)} if model.effects else {})
+
+
+def _sizes(effects: Sequence[Effect]) -> dict[str, dict[str, float]]:
+    return {effect.name: {key: float(value) for key, value in effect.parameters.items()} for effect in effects}
 
 
 def _unit(parameter: str) -> str:

@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 from jaxident.effects.checks import check_delay, check_effects
 from jaxident.errors import InputError
 from jaxident.robot.excitation import EXCITATIONS
-from jaxident.robot.model import Model, require_physical
+from jaxident.robot.model import Effect, Model, require_physical
 from jaxident.study.estimators import Choice, check_choice
 
-AXES = ("excitation", "samples", "robot", "period", "amplitude", "noise", "seed")
-"""The axes of a study's trials in their order, the last one fastest."""
+AXES = ("excitation", "samples", "robot", "effect", "period", "amplitude", "noise", "seed")
+"""The axes of a study's trials in their order, the last one fastest; `effect` where a study has `effects`, else not."""
 
 PARTS = ("rate", "gain", "coupling", "dead_zone")
 """The parts of a robot that a study may scale or spread."""
@@ -31,6 +31,14 @@ class Candidate(NamedTuple):
     spread: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
 
 
+class EffectSet(NamedTuple):
+    """An entry of a study's axis of effects: its name, and the effects that it adds to every robot, none for the robots
+    as they are."""
+
+    name: str
+    effects: tuple[Effect, ...] = ()
+
+
 class Study(NamedTuple):
     """A Monte-Carlo study: every combination of its axes, each with `seeds` seeds, each seen by every estimator.
 
@@ -38,6 +46,8 @@ class Study(NamedTuple):
     standard deviations of the camera's position [m], its heading has heading_per_position [rad/m] times as much;
     correlation_time [s] of both, None for white noise. hold: samples that a level of the excitation lasts. seed: the
     number that all random draws follow from. chunk: trials computed and stored together, which bounds the memory.
+    effects: sets that are added to every robot in turn, under the same random numbers; where there are none, the robots
+    have their own effects alone, and the trials have no axis `effect`.
     """
 
     robots: tuple[Candidate, ...]
@@ -54,17 +64,30 @@ class Study(NamedTuple):
     seed: int = 0
     name: str = "study"
     chunk: int = CHUNK
+    effects: tuple[EffectSet, ...] = ()
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Those of AXES that the study has, in their order."""
+        return tuple(axis for axis in AXES if axis != "effect" or self.effects)
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Length of each of AXES."""
-        axes = (self.excitations, self.samples, self.robots, self.period, self.amplitude, self.noise)
-        return (*map(len, axes), self.seeds)
+        """Length of each of `axes`."""
+        entries = (self.excitations, self.samples, self.robots, *([self.effects] if self.effects else []), self.period,
+                   self.amplitude, self.noise)  # fmt: skip
+        return (*map(len, entries), self.seeds)
 
     @property
-    def effects(self) -> frozenset[str]:
-        """Names of the effects that any of the robots has."""
-        return frozenset(effect.name for candidate in self.robots for effect in candidate.model.effects)
+    def in_force(self) -> tuple[tuple[tuple[Effect, ...], ...], ...]:
+        """The effects of a trial by its place on the axes robot and effect; without the latter, one place there."""
+        added = [one.effects for one in self.effects] or [()]
+        return tuple(tuple((*one.model.effects, *more) for more in added) for one in self.robots)
+
+    @property
+    def effect_names(self) -> frozenset[str]:
+        """Names of the effects that are in force in any trial."""
+        return frozenset(effect.name for robot in self.in_force for effects in robot for effect in effects)
 
     @property
     def trials(self) -> int:
@@ -82,8 +105,11 @@ def check_study(study: Study, where: str = "study") -> None:
         raise InputError(f"{where}: heading_per_position: is {study.heading_per_position:g}; it should not be negative")
     if study.correlation_time is not None and not study.correlation_time > 0.0:
         raise InputError(f"{where}: correlation_time: is {study.correlation_time:g}; it should be above 0, or left out")
+    duration = (min(study.samples) - 1) * min(study.period)
     for candidate in study.robots:
-        _check_candidate(candidate, f"{where}: robot {candidate.name!r}", (min(study.samples) - 1) * min(study.period))
+        _check_candidate(candidate, f"{where}: robot {candidate.name!r}", duration)
+    for one in study.effects:
+        _check_set(one, study.robots, f"{where}: effects: {one.name!r}", duration)
     for choice in study.estimators:
         check_choice(choice, f"{where}: estimator {choice.name!r}")
 
@@ -96,6 +122,8 @@ def _check_axes(study: Study, where: str) -> None:
     entries = {key: getattr(study, key) for key in ("excitations", "amplitude", "samples", "period", "noise")}
     for key, values in (entries | {"robots": names[0], "estimators": names[1]}).items():
         _check_axis(values, f"{where}: {key}")
+    if study.effects:
+        _check_axis([one.name for one in study.effects], f"{where}: effects")
     for key, values in (("amplitude", study.amplitude), ("period", study.period)):
         if min(values) <= 0.0:
             raise InputError(f"{where}: {key}: {min(values):g} is not above 0")
@@ -126,3 +154,19 @@ def _check_candidate(candidate: Candidate, where: str, duration: float) -> None:
     bad = next((width for width in candidate.spread if not 0.0 <= width < 1.0), None)
     if bad is not None:
         raise InputError(f"{where}: spread: {bad:g} should be at least 0 and below 1")
+
+
+def _check_set(one: EffectSet, robots: Sequence[Candidate], where: str, duration: float) -> None:
+    """`duration` [s]: that of the shortest run."""
+    try:
+        check_effects(one.effects)
+        check_delay(one.effects, duration)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    names = {effect.name for effect in one.effects}
+    for robot in robots:
+        twice = next((effect.name for effect in robot.model.effects if effect.name in names), None)
+        if twice is not None:
+            raise InputError(
+                f"{where}: robot {robot.name!r} has {twice!r} of its own already; take it out of one of the two"
+            )

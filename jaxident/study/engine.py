@@ -15,7 +15,7 @@ from jaxident.numerics import require_float64
 from jaxident.robot.excitation import EXCITATIONS
 from jaxident.robot.model import require_physical
 from jaxident.study.batch import in_parallel
-from jaxident.study.design import AXES, PARTS, Study
+from jaxident.study.design import PARTS, Study
 from jaxident.study.estimators import runs_alone
 from jaxident.study.trial import Cell, Outcome, Plan, Recording, Robot, commands, record, run_trial
 
@@ -42,10 +42,10 @@ class Piece(NamedTuple):
 
 
 def chunk_shape(study: Study) -> tuple[int, ...]:
-    """Lengths of a chunk on AXES: whole axes from the last one on, as long as its trials are not more than
+    """Lengths of a chunk on the study's axes: whole axes from the last one on, as long as its trials are not more than
     `study.chunk`."""
     room, shape = study.chunk, []
-    for axis, length in zip(reversed(AXES), reversed(study.shape), strict=True):
+    for axis, length in zip(reversed(study.axes), reversed(study.shape), strict=True):
         size = 1 if axis in STATIC else max(1, min(length, room))
         room = room // size if size == length else 1
         shape.append(size)
@@ -73,20 +73,22 @@ def run_chunk(study: Study, piece: Piece, cores: int | None = None) -> Outcome:
     up with copies of its last trial. Needs double precision.
     """
     require_float64("study")
-    index = np.indices(piece.shape).reshape(len(AXES), -1) + np.array([[part.start] for part in piece.cut])
+    index = np.indices(piece.shape).reshape(len(piece.shape), -1) + np.array([[part.start] for part in piece.cut])
     outcome = _run(study, index, cores)
     return Outcome(*(part.reshape(*piece.shape, *part.shape[1:]) for part in outcome))
 
 
 def run_one(study: Study, number: int) -> tuple[Recording, Outcome]:
-    """Trial `number`, counted along AXES with the last fastest, alone: its recording, and its outcome, which is
-    bit by bit that in the whole study."""
+    """Trial `number`, counted along the study's axes with the last fastest, alone: its recording, and its outcome,
+    which is bit by bit that in the whole study."""
     require_float64("study")
     index = np.array(np.unravel_index(number, study.shape))[:, None]
     cell = jax.tree.map(lambda leaf: leaf[0], cells(study, index))
     command = Wheels(*(u[0] for u in _commands(study, index, cells(study, index))))
     outcome = _run(study, np.repeat(index, block_size(study), axis=1), 1)
-    recording = jax.jit(record, static_argnames="effects")(jax.random.key(study.seed), cell, command, study.effects)
+    recording = jax.jit(record, static_argnames="effects")(
+        jax.random.key(study.seed), cell, command, study.effect_names
+    )
     return jax.tree.map(np.asarray, recording), Outcome(*(part[0] for part in outcome))
 
 
@@ -104,19 +106,19 @@ def block_size(study: Study) -> int:
 
 
 def cells(study: Study, index: np.ndarray) -> Cell:
-    """The cells of trials whose indices on AXES are the columns of `index` (axes, trials)."""
-    excitation, _, robot, period, amplitude, noise, seed = index
-    position = np.asarray(study.noise, float)[noise]
-    memory = None if study.correlation_time is None else np.full(len(seed), float(study.correlation_time))
+    """The cells of trials whose indices on the study's axes are the columns of `index` (axes, trials)."""
+    at = dict(zip(study.axes, index, strict=True))
+    position = np.asarray(study.noise, float)[at["noise"]]
+    memory = None if study.correlation_time is None else np.full(index.shape[1], float(study.correlation_time))
     return Cell(
-        Robot(*(None if part is None else part[robot] for part in _robots(study))),
-        np.asarray(study.period, float)[period],
-        np.asarray(study.amplitude, float)[amplitude],
+        _robots(study, at["robot"], at.get("effect", np.zeros_like(at["robot"]))),
+        np.asarray(study.period, float)[at["period"]],
+        np.asarray(study.amplitude, float)[at["amplitude"]],
         position,
         study.heading_per_position * position,
         memory,
-        seed,
-        np.array([_KINDS.index(kind) for kind in study.excitations])[excitation],
+        at["seed"],
+        np.array([_KINDS.index(kind) for kind in study.excitations])[at["excitation"]],
     )
 
 
@@ -145,10 +147,10 @@ def _commands(study: Study, index: np.ndarray, where: Cell) -> Wheels:
 
 def _program(study: Study, size: int) -> Callable[[int], Callable[..., Outcome]]:
     """For a run length the compiled program of a block: the shapes of its arguments are those of any cell."""
-    cell = cells(study, np.zeros((len(AXES), size), int))
+    cell = cells(study, np.zeros((len(study.axes), size), int))
     leaves, tree = jax.tree.flatten(cell)
     shapes = tuple((leaf.shape, str(leaf.dtype)) for leaf in leaves)
-    return lambda samples: _compiled(Plan(samples, study.estimators, study.effects), tree, shapes)
+    return lambda samples: _compiled(Plan(samples, study.estimators, study.effect_names), tree, shapes)
 
 
 @functools.lru_cache(maxsize=64)
@@ -172,18 +174,20 @@ def _spread(block: Any) -> Any:
     return jax.device_put(block, _sharding())
 
 
-def _robots(study: Study) -> Robot:
-    """The study's robots, each part as one array (robots, ...); a part that none has is None."""
+def _robots(study: Study, robot: np.ndarray, effect: np.ndarray) -> Robot:
+    """The robots of trials whose places on these two axes (trials,) are given, each part as one array (trials, ...); a
+    part that none in the study has is None."""
     models = [candidate.model for candidate in study.robots]
     drives = [require_physical(model) for model in models]
     coupled = any(drive.coupling is not None for drive in drives)
     slips = [(0.0, 0.0) if m.noise is None else (m.noise.slip_along, m.noise.slip_heading) for m in models]
+    vectors = [[to_vector(effects) for effects in sets] for sets in study.in_force] if study.effect_names else None
     return Robot(
-        np.array([drive.rate for drive in drives], float),
-        np.array([drive.gain for drive in drives], float),
-        np.array([np.zeros(2) if d.coupling is None else d.coupling for d in drives], float) if coupled else None,
-        np.array([model.dead_zone for model in models], float),
-        np.array(slips, float) if np.any(np.array(slips, float)) else None,
-        np.array([candidate.spread for candidate in study.robots], float).reshape(-1, len(PARTS)),
-        np.array([to_vector(model.effects) for model in models], float) if study.effects else None,
+        np.array([drive.rate for drive in drives], float)[robot],
+        np.array([drive.gain for drive in drives], float)[robot],
+        np.array([np.zeros(2) if d.coupling is None else d.coupling for d in drives])[robot] if coupled else None,
+        np.array([model.dead_zone for model in models], float)[robot],
+        np.array(slips, float)[robot] if np.any(np.array(slips, float)) else None,
+        np.array([candidate.spread for candidate in study.robots], float).reshape(-1, len(PARTS))[robot],
+        None if vectors is None else np.array(vectors, float)[robot, effect],
     )

@@ -33,8 +33,6 @@ BROKEN_ERROR, BROKEN_SHARE = 0.1, 0.1
 NUMBERS = 2_000_000
 """Numbers of a variable read at once."""
 
-CELLS = AXES[:-1]
-
 
 class Errors(NamedTuple):
     """Statistics over the trials of cells, each (..., parameters); quantiles (..., parameters, LEVELS)."""
@@ -50,6 +48,11 @@ class Errors(NamedTuple):
     coverage_se: Any
     truth: Any
     quantiles: Any
+
+
+def cell_axes(arrays: xarray.Dataset) -> tuple[str, ...]:
+    """The axes of a study's cells, all but its seeds, in their order: those that its trials or its summary have."""
+    return tuple(axis for axis in AXES[:-1] if axis in arrays.dims)
 
 
 def error_statistics(estimate: Array, deviation: Array, truth: Array) -> Errors:
@@ -98,7 +101,7 @@ def summarise(trials: xarray.Dataset, bound: xarray.DataArray | None = None) -> 
     trials may lie on disk: little of them is read at a time. bound: smallest standard deviation possible, such as
     Cramer and Rao's, on any of the axes of the result; adds `rmse_over_bound`.
     """
-    shape = tuple(trials.sizes[axis] for axis in (*CELLS, "estimator", "parameter"))
+    shape = tuple(trials.sizes[axis] for axis in (*cell_axes(trials), "estimator", "parameter"))
     found = {name: np.full(shape, np.nan) for name in Errors._fields[:-1]}
     found["quantiles"] = np.full((*shape, len(LEVELS)), np.nan)
     failures = np.zeros((*shape[:-1], len(REASONS) - 1), int)
@@ -151,7 +154,7 @@ def _read(trials: xarray.Dataset, cut: tuple[slice, ...], number: int, columns: 
 
 
 def _named(trials: xarray.Dataset, found: dict[str, Any], failures: Any, bound: Any) -> xarray.Dataset:
-    axes = (*CELLS, "estimator", "parameter")
+    axes = (*cell_axes(trials), "estimator", "parameter")
     named = {name: ((*axes, "quantile") if name == "quantiles" else axes, value) for name, value in found.items()}
     summary = xarray.Dataset({**named, "failures": ((*axes[:-1], "reason"), failures)})
     summary = summary.assign_coords({n: c for n, c in trials.coords.items() if "seed" not in c.dims})

@@ -3,7 +3,7 @@
     seed_key = fold_in(key(study.seed), seed)       the robot, where it is drawn
     run_key  = fold_in(seed_key, excitation)        the excitation's draws and the unit noise
 
-Noise level, amplitude, robot (its effects included) and estimator are in no key: all of them see the same random
+Noise level, amplitude, robot, effects and estimator are in no key: all of them see the same random
 numbers (common random numbers), so that differences between them are sharp. No trial depends on which others a study
 holds.
 """
@@ -27,7 +27,7 @@ from jaxident.study.estimators import Choice, estimate, see
 class Robot(NamedTuple):
     """Parts of a robot: rate (2,), gain (2, 2), coupling (2,) or None, dead_zone (2,), slip (2,) along and in heading
     or None; spread (4,): the largest relative departure of each part, drawn anew for each seed; effects (parameters,):
-    the catalogue's vector, or None where no robot of the study has any."""
+    the catalogue's vector, or None where no trial of the study has any."""
 
     rate: Any
     gain: Any
@@ -53,7 +53,7 @@ class Cell(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """What the compiled program of a trial is fixed to; effects: names of those that any robot of the study has."""
+    """What the compiled program of a trial is fixed to; effects: names of those in force in any trial of the study."""
 
     samples: int
     estimators: tuple[Choice, ...]
@@ -101,7 +101,7 @@ def commands(base: Array, cells: Cell, kind: str, samples: int, hold: int) -> Wh
 
 def record(base: Array, cell: Cell, command: Wheels, effects: frozenset[str] = frozenset()) -> Recording:
     """Simulate one trial under given commands (samples,), and let the camera look: by the nominal simulator, or the
-    full one where a robot of the study has `effects` (their names)."""
+    full one where trials of the study have `effects` (their names)."""
     key_robot, _, key = seed_keys(base, cell)
     robot = draw_robot(key_robot, cell)
     law = Noise(cell.position, cell.heading, cell.correlation_time)

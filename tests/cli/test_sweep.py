@@ -57,6 +57,25 @@ def test_one_trial_alone(swept):
     assert "0 to 11" in run("study.toml", "--out", "out", "--trial", 12, cwd=swept, code=2).stderr
 
 
+@pytest.mark.slow
+def test_an_axis_of_effects(tmp_path):
+    text = SMALL_TOML.replace("hold = 3", "hold = 3\neffects = ['none', { transport_delay = { delay = 0.05 } }]")
+    (tmp_path / "study.toml").write_text(text)
+    assert "24 trials" in run("study.toml", "--out", "out", cwd=tmp_path).stdout
+    with open(tmp_path / "out" / "summary.csv") as stream:
+        rows = list(csv.DictReader(stream))
+    assert list(rows[0])[2:4] == ["robot", "effect"]
+    late = [row for row in rows if row["effect"] == "transport_delay delay=0.05"]
+    assert len(late) == len(rows) // 2
+    assert not any(row["rmse_over_bound"] for row in late)
+    page = (tmp_path / "out" / "index.html").read_text()
+    assert "2 sets of effects" in page
+    assert "error [%] by effect" in page
+    run("study.toml", "--out", "out", "--trial", 12, cwd=tmp_path)
+    with xarray.open_zarr(tmp_path / "out" / "trials.zarr") as found:
+        assert found["estimate"].sel(effect="none").size == len(rows) // 2 * 6
+
+
 def test_wrong_use(swept):
     for words, said in (
         (("study.toml",), "--out DIR"),

@@ -125,5 +125,10 @@ def test_folders_are_made_where_they_are_missing(tmp_path):
         assert (tmp_path / "a" / "b").is_dir()
     (tmp_path / "file").touch()
     for name in ("file", "file/a"):
-        with pytest.raises(InputError, match=r"file.*: cannot be written: "):
+        with pytest.raises(InputError, match=r"file.*: .*file is a file; give the name of a folder"):
             make_folder(tmp_path / name)
+    (tmp_path / "link").symlink_to("nowhere")
+    with pytest.raises(InputError, match=r"link: cannot be written: "):
+        make_folder(tmp_path / "link")
+    with pytest.raises(InputError, match="empty"):
+        make_folder("")

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from support.studies import SMALL, SMALL_TOML
 
+from jaxident.effects.catalogue import CATALOGUE
 from jaxident.errors import InputError
 from jaxident.files.models import save_model
 from jaxident.files.studies import EXAMPLE, parse_study, read_study
@@ -21,7 +22,8 @@ def test_the_example_reads_with_and_without_its_comments():
     assert study.shape == (2, 1, 1, 1, 1, 4, 50)
     every = parse_study(re.sub(r"^# (?=\w+ = )", "", EXAMPLE, flags=re.MULTILINE), "study.toml")
     assert len(every.robots) == 3 * 4
-    assert every.effects == {"motor_lag", "coulomb_friction"}
+    assert every.effect_names == {"motor_lag", "coulomb_friction", "turn_loss", "slope", "supply_sag"}
+    assert [one.name for one in every.effects] == ["none", "turn_loss", "slope x0.5", "slope x2", "sag"]
     assert every.period == (0.0333, 0.1)
     assert every.correlation_time == 0.5
 
@@ -44,21 +46,38 @@ def test_a_grid_of_robots(tmp_path):
 
 
 def test_sets_of_effects_become_robots():
-    sets = "[{}, { motor_lag = 0.5, slope = 2 }, { stiction = { right = 0.1 } }, { input_saturation = 2 }]"
+    sets = "[{}, { motor_lag = 0.5, slope = 2 }, { stiction = { right = 0.1 } }, { input_saturation = [2, 4] }]"
     text = SMALL_TOML.replace(
         "spread = { gain = 0.2, dead_zone = 0.1 }", f"scale = {{ rate = [1, 2] }}, effects = {sets}"
     )
     study = parse_study(text, "study.toml")
     assert [robot.name for robot in study.robots[::2]] == [
         "published ratex1", "published ratex1 + motor_lag x0.5 + slope x2", "published ratex1 + stiction right=0.1",
-        "published ratex1 + input_saturation x2",
+        "published ratex1 + input_saturation x2", "published ratex1 + input_saturation x4",
     ]  # fmt: skip
     found = [{effect.name: effect.parameters for effect in robot.model.effects} for robot in study.robots[1::2]]
     assert found[0] == {}
     assert found[1]["motor_lag"] == {"time_constant": 0.03}
     assert found[1]["slope"] == {"acceleration": 0.1, "direction": 0.7}  # the direction is a shape
-    assert found[2:] == [{"stiction": {"right": 0.1}}, {"input_saturation": {"level": 0.3}}]
+    assert found[2:4] == [{"stiction": {"right": 0.1}}, {"input_saturation": {"level": 0.3}}]
+    assert found[4] == {"input_saturation": {"level": 0.15}}
     assert describe(study)["robots"][2]["effects"] == found[1]
+
+
+def test_an_axis_of_effects():
+    axis = (
+        "['none', 'turn_loss', { motor_lag = [0.5, 1], slope = 2 }, { slope = { acceleration = 1 } }, { name = 'a' }]"
+    )
+    study = parse_study(SMALL_TOML.replace("hold = 3", f"hold = 3\neffects = {axis}"), "study.toml")
+    assert [one.name for one in study.effects] == [
+        "none", "turn_loss", "motor_lag x0.5 + slope x2", "motor_lag x1 + slope x2", "slope acceleration=1", "a",
+    ]  # fmt: skip
+    sizes = [{effect.name: effect.parameters for effect in one.effects} for one in study.effects]
+    assert sizes[0] == sizes[5] == {}
+    assert sizes[1]["turn_loss"] == CATALOGUE["turn_loss"].typical()
+    assert sizes[2]["motor_lag"] == {"time_constant": 0.03}
+    assert sizes[4] == {"slope": {"acceleration": 1.0}}
+    assert [one["name"] for one in describe(study)["effects"]] == [one.name for one in study.effects]
 
 
 @pytest.mark.parametrize(
@@ -84,6 +103,21 @@ def test_sets_of_effects_become_robots():
         ("spread = {", "effects = [{ motor_lag = { tau = 1 } }], spread = {", ["effects[0]", "'tau'"]),
         ("spread = {", "effects = [{ transport_delay = { delay = 9 } }], spread = {", ["delay is 9 s", "longer"]),
         ("spread = {", "effects = [], spread = {", ["effects", "empty"]),
+        ("hold = 3", "hold = 3\neffects = []", ["effects", "empty"]),
+        ("hold = 3", "hold = 3\neffects = 'slope'", ["effects", "list"]),
+        ("hold = 3", "hold = 3\neffects = [1]", ["effects[0]", "object"]),
+        (
+            "hold = 3",
+            "hold = 3\neffects = ['none', 'turnloss']",
+            ["effects[1]", "unknown effect 'turnloss'", "turn_loss"],
+        ),
+        ("hold = 3", "hold = 3\neffects = [{ lag = 1 }]", ["effects[0]", "unknown effect 'lag'"]),
+        ("hold = 3", "hold = 3\neffects = [{ motor_lag = [1, 0] }]", ["effects[0]: motor_lag", "above 0"]),
+        ("hold = 3", "hold = 3\neffects = [{ motor_lag = [] }]", ["effects[0]: motor_lag", "empty"]),
+        ("hold = 3", "hold = 3\neffects = [{ motor_lag = {} }]", ["effects[0]: motor_lag", "no parameter"]),
+        ("hold = 3", "hold = 3\neffects = [{ motor_lag = { tau = 1 } }]", ["effects", "'tau'", "time_constant"]),
+        ("hold = 3", "hold = 3\neffects = ['slope', 'slope']", ["effects", "'slope'", "twice"]),
+        ("hold = 3", "hold = 3\neffects = [{ name = 'a', slope = [1, 2] }]", ["effects[0]: name", "2 sets"]),
         ("hold = 3", "hold = = 3", ["not TOML", "line"]),
     ],
 )

@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 import xarray
-from support.studies import SMALL
+from support.studies import SMALL, UNDER_EFFECTS
 
 import jaxident as ji
 from jaxident.errors import InputError, WorkError
@@ -82,6 +82,18 @@ def test_a_sweep_that_was_ended_goes_on(tmp_path, finished, counted, count):
     assert not list(tmp_path.glob(".part-*"))
 
 
+def test_a_sweep_over_effects_goes_on(tmp_path, counted):
+    sweep(UNDER_EFFECTS, tmp_path / "whole")
+    with pytest.raises(Killed):
+        sweep(UNDER_EFFECTS, tmp_path / "ended", told=killed_after(5))
+    counted.clear()
+    found = ji.study(UNDER_EFFECTS, out=tmp_path / "ended")
+    assert counted == list(range(5, 12))
+    assert files(tmp_path / "ended") == files(tmp_path / "whole")
+    assert list(found["effect"].values) == ["none", "payload", "late"]
+    xarray.testing.assert_identical(found.load(), study_arrays(UNDER_EFFECTS))
+
+
 @pytest.mark.parametrize("harm", ["delete", "truncate", "change", "empty_marker", "metadata"])
 def test_damage_is_repaired(tmp_path, finished, counted, harm):
     sweep(SMALL, tmp_path)
@@ -119,6 +131,7 @@ def test_a_finished_sweep_computes_nothing(tmp_path, finished, counted):
     [
         (SMALL._replace(seed=1), ["study.seed", "0 there", "1 here"]),
         (SMALL._replace(noise=(1e-6, 1e-3)), ["study.noise"]),
+        (UNDER_EFFECTS, ["study.effects is null there"]),
         (SMALL._replace(robots=(SMALL.robots[0]._replace(name="other"),)), ["study.robots"]),
         (SMALL._replace(estimators=(SMALL.estimators[0]._replace(settings=(("d_max_share", 0.5),)),)), ["estimators"]),
     ],
@@ -175,6 +188,18 @@ def test_a_full_disk_loses_nothing(tmp_path, finished, counted, monkeypatch):
     counted.clear()
     sweep(SMALL, tmp_path)
     assert counted == [1, 2, 3]
+    assert files(tmp_path) == finished
+
+
+def test_a_full_disk_leaves_a_finished_store_its_name(tmp_path, finished, monkeypatch):
+    def full(study, path):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    sweep(SMALL, tmp_path)
+    with monkeypatch.context() as patch:
+        patch.setattr(trials, "_write_skeleton", full)
+        with pytest.raises(WorkError, match=r"No space left .* are kept"):
+            sweep(SMALL, tmp_path)
     assert files(tmp_path) == finished
 
 

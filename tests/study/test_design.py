@@ -3,18 +3,23 @@
 import dataclasses
 
 import pytest
-from support.studies import ROBOT, SMALL
+from support.studies import ROBOT, SMALL, UNDER_EFFECTS
 
 from jaxident.errors import InputError
 from jaxident.robot.model import Effect
-from jaxident.study.design import Candidate, check_study
+from jaxident.study.design import Candidate, EffectSet, check_study
 from jaxident.study.estimators import Choice, settings_of
+
+LAGGING = dataclasses.replace(ROBOT, effects=(Effect("motor_lag", {"time_constant": 0.05}),))
 
 
 def test_shape_counts_trials():
     check_study(SMALL)
     assert SMALL.shape == (1, 1, 1, 1, 1, 2, 6)
     assert SMALL.trials == 12
+    check_study(UNDER_EFFECTS)
+    assert UNDER_EFFECTS.shape == (1, 1, 1, 3, 1, 1, 2, 6)
+    assert UNDER_EFFECTS.axes[2:5] == ("robot", "effect", "period")
 
 
 @pytest.mark.parametrize(
@@ -41,6 +46,13 @@ def test_shape_counts_trials():
         (
             {"robots": (Candidate("odd", dataclasses.replace(ROBOT, effects=(Effect("backlash", {"right": -1.0}),))),)},
             ["odd", "right is -1"],
+        ),
+        ({"effects": (EffectSet("none"), EffectSet("none"))}, ["effects", "'none'", "twice"]),
+        ({"effects": (EffectSet("a", (Effect("lag", {}),)),)}, ["effects: 'a'", "unknown effect 'lag'"]),
+        ({"effects": (EffectSet("a", (Effect("transport_delay", {"delay": 9.0}),)),)}, ["'a'", "delay is 9 s"]),
+        (
+            {"robots": (Candidate("slow", LAGGING),), "effects": (EffectSet("lag", LAGGING.effects),)},
+            ["effects: 'lag'", "robot 'slow' has 'motor_lag' of its own", "one of the two"],
         ),
     ],
 )

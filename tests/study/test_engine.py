@@ -10,7 +10,6 @@ from jaxident.effects.catalogue import CATALOGUE
 from jaxident.robot.excitation import staircase
 from jaxident.study import engine, trial
 from jaxident.study.dataset import study_arrays
-from jaxident.study.design import AXES
 from jaxident.study.engine import chunk_shape, chunks, pieces, run_chunk, run_one
 from jaxident.study.estimators import AT_REST, FOUND, NOT_FINITE, REASONS, Finding, Method
 from jaxident.study.statistics import summarise
@@ -122,12 +121,12 @@ def test_effects_act_on_their_robots_alone():
         for size in (1e-12, 1.0)
     ]
     study = SMALL._replace(robots=tuple(robots))
-    index = np.zeros((len(AXES), len(robots)), int)
-    index[AXES.index("robot")] = np.arange(len(robots))
+    index = np.zeros((len(study.axes), len(robots)), int)
+    index[study.axes.index("robot")] = np.arange(len(robots))
     cells = engine.cells(study, index)
     base, rows = jax.random.key(study.seed), study.samples[0]
     command = trial.commands(base, cells, "staircase", rows, study.hold)
-    made = jax.jit(jax.vmap(lambda cell, u: trial.record(base, cell, u, study.effects)))(cells, command)
+    made = jax.jit(jax.vmap(lambda cell, u: trial.record(base, cell, u, study.effect_names)))(cells, command)
     alone = jax.jit(jax.vmap(lambda cell, u: trial.record(base, cell, u)))(cells, command)
     for kind in ("exact", "measured"):
         ours, nominal = (np.stack(getattr(each, kind), axis=-1) for each in (made, alone))

@@ -1,7 +1,8 @@
 """A study so small that its compiled program is most of its time; all tests share that program."""
 
 from jaxident.files.models import load_model
-from jaxident.study.design import Candidate, Study
+from jaxident.robot.model import Effect
+from jaxident.study.design import Candidate, EffectSet, Study
 from jaxident.study.estimators import Choice
 
 ROBOT = load_model("published")
@@ -17,6 +18,15 @@ SMALL = Study(
     chunk=4,
 )
 """Two noise levels, six seeds, chunks of four and two trials."""
+
+UNDER_EFFECTS = SMALL._replace(
+    effects=(
+        EffectSet("none"),
+        EffectSet("payload", (Effect("payload_change", {"ratio": 0.5, "instant": 1.0}),)),
+        EffectSet("late", (Effect("transport_delay", {"delay": 0.05}),)),
+    )
+)
+"""The same under no effect and under two, twelve chunks."""
 
 SMALL_TOML = """
 name = "study"

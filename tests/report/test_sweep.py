@@ -1,0 +1,39 @@
+"""The page and the table of a study, from invented trials."""
+
+import csv
+
+import numpy as np
+import pytest
+import xarray
+from support.studies import SMALL, UNDER_EFFECTS
+
+from jaxident.files.summary import write_summary
+from jaxident.report.sweep import write_study
+from jaxident.study.dataset import FURTHER_AXES, coordinates, layout
+from jaxident.study.statistics import summarise
+
+
+def invented(study):
+    """Trials whose estimates are the truth and an error of one per cent."""
+    draws = np.random.default_rng(0)
+    arrays = {name: np.zeros(shape, kind) for name, (shape, kind) in layout(study).items()}
+    arrays["truth"] += 1.0
+    arrays["deviation"] += 0.01
+    arrays["estimate"] = 1.0 + 0.01 * draws.normal(size=arrays["estimate"].shape)
+    named = {name: (study.axes + FURTHER_AXES[name], array) for name, array in arrays.items()}
+    return xarray.Dataset(named).assign_coords(coordinates(study).coords).assign_attrs(coordinates(study).attrs)
+
+
+@pytest.mark.parametrize(("study", "maps"), [(SMALL, 0), (UNDER_EFFECTS, 1)])
+def test_the_axis_of_effects_is_there_where_the_study_has_it(tmp_path, study, maps):
+    trials = invented(study)
+    summary = summarise(trials)
+    write_study(study, trials, summary, tmp_path / "index.html")
+    page = (tmp_path / "index.html").read_text()
+    assert ("3 sets of effects" in page) == bool(maps)
+    assert page.count('alt="batch: error [%] by effect, at 0.1 mm of camera noise"') == maps
+    write_summary(summary, tmp_path / "summary.csv")
+    with open(tmp_path / "summary.csv") as stream:
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == 2 * 12 * (3 if maps else 1)
+    assert {row.get("effect") for row in rows} == ({"none", "payload", "late"} if maps else {None})
