@@ -160,9 +160,9 @@ NOTHING_TO_SHRINK = (
 )
 SHRINK = (
     "0 % leaves the gap as it is after the nominal parameters are refitted, 100 % brings it down to the floor; beyond, "
-    "the error came out below the floor. All on stretches that took no part in finding the effect. Intervals (90 %) hold "
-    "the chance in these stretches and what is not known of the noise and of the parameters. The placebo is the effect "
-    "that least speaks for: its interval should hold 0 %, or the numbers above it are worth less."
+    "the error came out below the floor. All on stretches that took no part in finding the effect. Intervals (90 %) "
+    "hold the chance in these stretches and what is not known of the noise and of the parameters. The placebo is the "
+    "effect that least speaks for: its interval should hold 0 %, or the numbers above it are worth less."
 )
 
 
