@@ -34,6 +34,7 @@ _HOMES = {
     "EXCITATIONS": "jaxident.robot.excitation",
     "identify": "jaxident.estimation.identify",
     "diagnose": "jaxident.diagnosis.diagnose",
+    "bootstrap": "jaxident.estimation.bootstrap",
     "cramer_rao": "jaxident.estimation.precision",
     "predict": "jaxident.estimation.predict",
     "read_log": "jaxident.files.logs",

@@ -5,12 +5,16 @@ import dataclasses
 import click
 
 from jaxident.cli.progress import working
-from jaxident.cli.session import json_option, table, write_json, wrote
+from jaxident.cli.session import json_option, seed_option, table, write_json, wrote
 from jaxident.start import start_jax
 
 NOTES = {
     "paper": "Intervals take the equation error for white. Camera noise makes it coloured and biases these estimates: "
     "see the README, 'What the paper's method can and cannot do'.",
+    "instrumental-variables": "Intervals take the filtered equation error for white. Camera noise makes path lengths "
+    "longer than the path, which biases what is estimated from them.",
+    "key-term-least-squares": "Intervals take the equation error for white. Camera noise makes it coloured and biases "
+    "these estimates, as it does the paper's.",
     "maximum-likelihood": "Intervals hold under the noise law above; all poses were used, start states estimated.",
 }
 
@@ -18,7 +22,10 @@ NOTES = {
 @click.command()
 @click.argument("logs", nargs=-1, required=True, metavar="LOG...")
 @click.option(
-    "--method", type=click.Choice(["maximum-likelihood", "paper"]), default="maximum-likelihood", show_default=True
+    "--method",
+    type=click.Choice(["maximum-likelihood", "paper", "instrumental-variables", "key-term-least-squares"]),
+    default="maximum-likelihood",
+    show_default=True,
 )
 @click.option(
     "--noise-law",
@@ -38,10 +45,21 @@ NOTES = {
     type=click.Choice(["free-run", "one-step"]),
     help="How the cost of the start values reads the paper's (21); one-step by default (paper).",
 )
+@click.option(
+    "--bootstrap", "count", type=int, metavar="N", help="Also intervals from N refits to resampled residuals; 200 do."
+)
+@click.option(
+    "--resample",
+    type=click.Choice(["blocks", "runs"]),
+    default="blocks",
+    show_default=True,
+    help="What --bootstrap draws: blocks of residuals, or whole runs, of which it takes many.",
+)
+@seed_option
 @click.option("--out", metavar="MODEL", help="The model file to write.")
 @click.option("--report", metavar="FILE", help="A page (.html): intervals, verdicts, doubts, residuals, pictures.")
 @json_option
-def command(logs, method, noise_law, setup_time, forgetting, coupling, d_max, reading, out, report, json_file):
+def command(logs, method, noise_law, coupling, d_max, reading, count, resample, seed, out, report, json_file, **paper):
     """The model behind one or several logs (files, folders, or `-`), runs in the order given.
 
     Example: jaxident identify log.csv --out model.json
@@ -54,35 +72,62 @@ def command(logs, method, noise_law, setup_time, forgetting, coupling, d_max, re
     from jaxident.files.models import model_to_dict, save_model
     from jaxident.robot.model import Provenance
 
-    if report and method == "paper":
-        raise click.UsageError("--report needs the method maximum-likelihood")
+    for option in [name for name, value in (("--report", report), ("--bootstrap", count)) if value is not None]:
+        if method != "maximum-likelihood":
+            raise click.UsageError(f"{option} needs the method maximum-likelihood")
     records = read_logs(logs)
-    settings = {"noise_law": noise_law, "setup_time": setup_time, "forgetting": forgetting, "d_max": d_max}
-    settings["coupling"] = coupling
+    settings = {"noise_law": noise_law, "coupling": coupling, "d_max": d_max, **paper}
     with working("identifying"):
         found = identify(records, method, reading=reading and reading.replace("-", "_"), **settings)
+    again = count and _resample(found, records, count, resample, seed, d_max)
     origin = Provenance(jaxident.__version__, method, tuple(logs))
     model = dataclasses.replace(found.model, provenance=origin)
     rows = verdicts(model, max(float(abs(u).max()) for record in records for u in record.command))
-    _say(found, rows, method)
+    _say(found, rows, method, again)
     if out:
         save_model(model, out)
         wrote(out)
     if report:
         from jaxident.report.identification import write_identification
 
-        for path in write_identification(found._replace(model=model), records, rows, report):
+        for path in write_identification(found._replace(model=model), records, rows, report, again):
             wrote(path)
-    write_json(
-        {"model": model_to_dict(model), "parameters": [row._asdict() for row in rows], "suspicions": found.suspicions},
-        json_file,
-    )
+    parameters = [row._asdict() for row in rows]
+    result = {"model": model_to_dict(model), "parameters": parameters, "suspicions": found.suspicions}
+    write_json(result | ({"bootstrap": _as_dict(again)} if again else {}), json_file)
 
 
-def _say(found, rows, method: str) -> None:
+def _resample(found, records, count, resample, seed, d_max):
+    """The bootstrap of a fit."""
+    import jax
+
+    from jaxident.estimation.bootstrap import bootstrap
+
+    with working(f"{count} refits"):
+        return bootstrap(jax.random.key(seed), found, records, count=count, resample=resample, d_max=d_max)
+
+
+def _as_dict(again) -> dict:
+    """A bootstrap for programs."""
+    intervals = {name: list(map(float, ends)) for name, ends in zip(again.order, again.interval, strict=True)}
+    return {
+        "resample": again.resample, "block": again.block, "count": len(again.ok), "arrived": int(again.ok.sum()),
+        "intervals": intervals,
+    }  # fmt: skip
+
+
+def _say(found, rows, method: str, again) -> None:
     """Print the parameters, what their intervals mean, and every warning."""
-    click.echo(table([("parameter", "estimate", "95 % interval", "this input"), *(row.cells() for row in rows)]))
+    from jaxident.estimation.bootstrap import describe, interval_cells
+
+    lines = [("parameter", "estimate", "95 % interval", "this input"), *(row.cells() for row in rows)]
+    if again:
+        beside = ["bootstrap", *interval_cells(again)]
+        lines = [(*line[:3], own, line[3]) for line, own in zip(lines, beside, strict=True)]
+    click.echo(table(lines))
     click.echo(NOTES[method])
+    if again:
+        click.echo(describe(again))
     for line in found.suspicions:
         click.echo(f"warning: {line}", err=True)
     if not bool(found.ok):

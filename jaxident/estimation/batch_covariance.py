@@ -1,4 +1,4 @@
-"""How certain the batch estimate is, whose dead zones are shared by both equations from the start."""
+"""Both equations' estimates brought to agree, whose dead zones are shared: by the information of each."""
 
 import jax
 import jax.numpy as jnp
@@ -14,23 +14,35 @@ PLACES = (0, 2, 3, 6, 7, 10, 11), (1, 4, 5, 8, 9, 10, 11)
 
 
 def batch_covariance(estimate: recursive.Estimate, variance: Increment) -> Array:
-    """Covariance (12, 12) in DIFFERENCE_ORDER, to first order; variance: of each equation's residuals.
+    """Covariance (12, 12) in DIFFERENCE_ORDER, to first order; variance: of each equation's residuals."""
+    equations = (estimate.length, estimate.turn)
+    unknowns = jnp.stack([jnp.stack(equation.unknowns) for equation in equations])
+    covariance = [v * full_covariance(equation) for v, equation in zip(variance, equations, strict=True)]
+    return pool(unknowns, jnp.stack(covariance))[1]
 
-    The information of both equations, each weighted by its noise, adds up in the dead zones. In the average of two
-    ratios, as the recursion forms it, the worse equation would rule.
+
+def pool(unknowns: Array, covariance: Array) -> tuple[Array, Array]:
+    """One estimate (12,) in DIFFERENCE_ORDER and its covariance (12, 12), to first order, from unknowns (2, 7) of both
+    equations, in the order of `regressors`, and their covariances (2, 7, 7).
+
+    The information of both equations adds up in the dead zones. In the average of two ratios, as the recursion forms
+    it, the worse equation would rule.
     """
     size = len(DIFFERENCE_ORDER)
-    total = jnp.zeros((size, size))
-    for places, equation, v in zip(PLACES, (estimate.length, estimate.turn), variance, strict=True):
-        slope = jnp.stack(jax.jacfwd(_own_parameters)(equation.unknowns), axis=-1)
-        own = _inverse(v * slope @ full_covariance(equation) @ slope.T)
-        rows = jnp.array(places)
-        total = total.at[rows[:, None], rows].add(own)
-    return _inverse(total)
+    total, places = jnp.zeros((size, size)), [jnp.array(rows) for rows in PLACES]
+    own = []
+    for rows, values, spread in zip(places, unknowns, covariance, strict=True):
+        slope = jax.jacfwd(_own_parameters)(values)
+        own.append(_inverse(slope @ spread @ slope.T))
+        total = total.at[rows[:, None], rows].add(own[-1])
+    pooled = _inverse(total)
+    first, second = (_own_parameters(values) for values in unknowns)
+    apart = jnp.zeros(size).at[places[0]].set(own[0][:, 5:] @ (first[5:] - second[5:]))
+    return jnp.zeros(size).at[places[0]].set(first).at[places[1]].set(second) + pooled @ apart, pooled
 
 
-def _own_parameters(unknowns: recursive.Vector) -> Array:
-    """An equation's parameters (7,), in the order of PLACES, from its unknowns."""
+def _own_parameters(unknowns: Array) -> Array:
+    """An equation's parameters (7,), in the order of PLACES, from its unknowns (7,)."""
     pole, new_r, edge_r, old_r, new_l, edge_l, old_l = unknowns
     ratios = (safe_divide(edge, new, 0.0) for edge, new in ((edge_r, new_r), (edge_l, new_l)))
     return jnp.stack([pole, new_r, new_l, -old_r, -old_l, *ratios])

@@ -12,6 +12,7 @@ from jaxident.array_types import Array, Increment, Pose, Wheels
 from jaxident.errors import InputError, WorkError
 from jaxident.estimation import recursive
 from jaxident.estimation.checks import check_informative
+from jaxident.estimation.identify_batch import YARDSTICKS, identify_batch
 from jaxident.estimation.identify_poses import identify_poses
 from jaxident.estimation.initialise import Setup, initialise
 from jaxident.estimation.least_squares import full_covariance
@@ -19,9 +20,10 @@ from jaxident.estimation.maximum_likelihood import Fit
 from jaxident.estimation.observations import observe_log
 from jaxident.log import Log, even_period, join
 from jaxident.numerics import require_float64
+from jaxident.robot.difference import Difference
 from jaxident.robot.model import DIFFERENCE_ORDER, Model, Provenance, Spread, difference_vector
 
-METHODS = ("maximum-likelihood", "paper")
+METHODS = ("maximum-likelihood", "paper", *YARDSTICKS)
 SETUP_SAMPLES = 200
 SETUP_SHARE = 0.3
 SMALLEST_LOG = 20
@@ -41,9 +43,9 @@ class Identification(NamedTuple):
     """A model, the covariance of its parameters in `model.parameter_order`, residuals with NaN where there is none, and
     whether every stage converged.
 
-    By maximum likelihood: residuals a `Pose` [m], [rad] (rows,), and the fit. By the paper: one-step residuals an
-    `Increment` [m], [rad] (samples,), and how the recursion came about. suspicions: what the log says against the
-    method's assumptions, a line each.
+    By maximum likelihood: residuals a `Pose` [m], [rad] (rows,), and the fit. Otherwise one-step residuals, an
+    `Increment` [m], [rad] (samples,), and by the paper how the recursion came about. suspicions: what the log says
+    against the method's assumptions, a line each.
     """
 
     model: Model
@@ -74,11 +76,13 @@ def identify(
     on the setup time (section VI), then recursive least squares (15)-(18) over the rest of an even log. Its settings:
     setup_time [s] from the start (default: 200 samples or three tenths, whichever is more); forgetting in (0, 1]
     (default 1); reading of (21): "one_step" (default), as the recursion reads it and best on real robots, or
-    "free_run". d_max bounds the dead zones [unit of the command] (default: 0.9 of the largest command). Needs double
-    precision; InputError says what a log lacks, WorkError that the result is not finite.
+    "free_run". methods "instrumental-variables" (one even run without gaps) and "key-term-least-squares" (even runs):
+    yardsticks, the same equations from all samples at once. d_max bounds the dead zones [unit of the command] (default:
+    0.9 of the largest command). Needs double precision; InputError says what a log lacks, WorkError that the result is
+    not finite.
     """
     require_float64("identify")
-    _check_method(method, coupling)
+    _check_method(method, coupling, {"setup time": setup_time, "forgetting": forgetting, "reading": reading})
     log = join(logs)
     check_informative(log)
     largest = float(np.nanmax(np.abs(np.stack(log.command))))
@@ -87,20 +91,22 @@ def identify(
     if method == "paper":
         settings = setup_time, 1.0 if forgetting is None else forgetting, reading or "one_step"
         return _identify_as_paper(log, d_max, *settings)
-    given = {"setup time": setup_time, "forgetting": forgetting, "reading": reading}
-    for name in [name for name, value in given.items() if value is not None]:
-        raise InputError(f"{name}: a setting of the method 'paper'; maximum likelihood has none such")
+    if method in YARDSTICKS:
+        return _identify_by_yardstick(log, method, d_max)
     found = identify_poses(log, d_max, noise_law, coupling)
     return Identification(
         found.model, found.model.covariance, found.residuals, found.fit.ok, fit=found.fit, suspicions=found.suspicions
     )
 
 
-def _check_method(method: str, coupling: bool) -> None:
+def _check_method(method: str, coupling: bool, of_the_paper: dict[str, Any]) -> None:
     if method not in METHODS:
         raise InputError(f"method {method!r}: choose from {', '.join(METHODS)}")
-    if method == "paper" and coupling:
-        raise InputError("coupling: a term of maximum likelihood; the method 'paper' has none such")
+    if method != "maximum-likelihood" and coupling:
+        raise InputError(f"coupling: a term of maximum likelihood; the method {method!r} has none such")
+    given = [name for name, value in of_the_paper.items() if value is not None]
+    if method != "paper" and given:
+        raise InputError(f"{given[0]}: a setting of the method 'paper'; {method} has none such")
 
 
 def _identify_as_paper(
@@ -111,15 +117,23 @@ def _identify_as_paper(
     estimate, setup, history, residuals, covariance = identify_recursively(
         Log(*(jnp.asarray(column) for column in log)), setup_rows, d_max, forgetting, reading
     )
-    model = _model(estimate, covariance, period, "paper")
+    model = _model(*recursive.parameters(estimate), covariance, period, "paper")
     return Identification(model, covariance, residuals, setup.ok, setup=setup, history=history)
 
 
-def _model(estimate: recursive.Estimate, covariance: Array, period: float, method: str) -> Model:
+def _identify_by_yardstick(log: Log, method: str, d_max: float) -> Identification:
+    period = even_period(log)
+    if len(log.t) < SMALLEST_LOG:
+        raise InputError(f"{len(log.t)} rows: the method needs at least {SMALLEST_LOG}")
+    difference, dead_zone, found, residuals = identify_batch(log, method, d_max)
+    model = _model(difference, dead_zone, found.covariance, period, method)
+    return Identification(model, found.covariance, residuals, found.ok)
+
+
+def _model(difference: Difference, dead_zone: Array, covariance: Array, period: float, method: str) -> Model:
     """The estimate as a model; WorkError where it is not finite."""
-    difference, dead_zone = recursive.parameters(estimate)
     if not all(np.all(np.isfinite(a)) for a in (*difference, dead_zone, covariance)):
-        raise WorkError("the recursive estimate is not finite: the log does not determine the model")
+        raise WorkError("the estimate is not finite: the log does not determine the model")
     return Model(
         period,
         difference,

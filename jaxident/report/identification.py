@@ -7,6 +7,7 @@ import numpy as np
 
 from jaxident import plot
 from jaxident.errors import InputError
+from jaxident.estimation.bootstrap import Bootstrap, describe, interval_cells
 from jaxident.estimation.identify import Identification
 from jaxident.estimation.residual_tests import CHANNELS, DRAWN_LAGS, correlations, fit_percent, residual_tests
 from jaxident.estimation.runs import stack_runs
@@ -18,21 +19,26 @@ from jaxident.report.page import Figure, Page, Section, Table, write_page
 
 
 def write_identification(
-    found: Identification, logs: Sequence[Log], verdicts: Sequence[Verdict], path: Target
+    found: Identification,
+    logs: Sequence[Log],
+    verdicts: Sequence[Verdict],
+    path: Target,
+    again: Bootstrap | None = None,
 ) -> list[str]:
-    """Write the page of a maximum-likelihood fit to some logs; returns its path. InputError for another method."""
+    """Write the page of a maximum-likelihood fit to some logs, a bootstrap's intervals beside its own where there is
+    one; returns its path. InputError for another method."""
     if found.fit is None:
         raise InputError("report: a page is written for maximum likelihood; the method 'paper' has none")
-    write_page(_page(found, join(logs), verdicts), path)
+    write_page(_page(found, join(logs), verdicts, again), path)
     return [os.fspath(path)]
 
 
-def _page(found: Identification, log: Log, verdicts: Sequence[Verdict]) -> Page:
+def _page(found: Identification, log: Log, verdicts: Sequence[Verdict], again: Bootstrap | None) -> Page:
     runs = stack_runs(log)
     normalised = np.asarray(found.fit.innovations.normalised) if found.fit is not None else np.zeros(0)
     percent = fit_percent(log, found.residuals)
     sections = [
-        Section("Parameters", [Table(COLUMNS, [row.cells() for row in verdicts], ABOUT_INTERVALS), _dead_zones(found)]),
+        Section("Parameters", [_parameters(verdicts, again), _dead_zones(found)]),
         Section("What speaks against it", _doubts(found)),
         Section("What it explains", [_percent_table(percent), _path(found, log)]),
         Section("What is left", [ABOUT_TESTS, _tests(normalised, runs), *_pictures(found, log, normalised, runs.seen)]),
@@ -51,6 +57,14 @@ def _lead(found: Identification, verdicts: Sequence[Verdict], percent: np.ndarra
         f"{sure} of {len(verdicts)} numbers are determined; the model explains {percent.min():.4g} % of {worst} and "
         f"more of the others.{doubts}{ending}"
     )
+
+
+def _parameters(verdicts: Sequence[Verdict], again: Bootstrap | None) -> Table:
+    rows = [row.cells() for row in verdicts]
+    if again is None:
+        return Table(COLUMNS, rows, ABOUT_INTERVALS)
+    beside = [(*row[:3], own, row[3]) for row, own in zip(rows, interval_cells(again), strict=True)]
+    return Table((*COLUMNS[:3], "bootstrap 95 %", COLUMNS[3]), beside, f"{ABOUT_INTERVALS} {describe(again)}")
 
 
 def _doubts(found: Identification) -> list[str]:

@@ -17,6 +17,8 @@ from jaxident.estimation import recursive
 from jaxident.estimation.batch_covariance import batch_covariance
 from jaxident.estimation.identify import D_MAX_SHARE, SETUP_SAMPLES, SETUP_SHARE, SMALLEST_LOG, parameter_covariance
 from jaxident.estimation.initialise import Setup, initialise
+from jaxident.estimation.instrumental import fit_instrumental
+from jaxident.estimation.key_term_fit import Batch, fit_key_terms
 from jaxident.estimation.maximum_likelihood import fit_runs
 from jaxident.estimation.observations import Observations, complete_observations, observe_log
 from jaxident.estimation.parameters import Law, to_vector
@@ -179,6 +181,21 @@ def likelihood(sight: Sight, settings: dict[str, Any]) -> Finding:
     return Finding(estimate, jnp.sqrt(jnp.diagonal(covariance)), jnp.where(fit.ok, FOUND, NOT_ARRIVED))
 
 
+def key_terms(sight: Sight, settings: dict[str, Any]) -> Finding:
+    """A yardstick: least squares with key-term separation, iterated over all rows (Voros 1997)."""
+    return _of_batch(fit_key_terms(sight.observations, d_max=settings["d_max_share"] * sight.largest))
+
+
+def instrumental(sight: Sight, settings: dict[str, Any]) -> Finding:
+    """A yardstick: refined instrumental variables over all rows (Young 2011)."""
+    return _of_batch(fit_instrumental(sight.observations, d_max=settings["d_max_share"] * sight.largest))
+
+
+def _of_batch(found: Batch) -> Finding:
+    deviation = jnp.sqrt(jnp.maximum(jnp.diagonal(found.covariance), 0.0))
+    return Finding(found.estimate, deviation, jnp.where(found.ok, FOUND, NOT_FINITE))
+
+
 def _start(sight: Sight, settings: dict[str, Any], count: int, forgetting: float):
     """The recursion at the end of the setup time, the setup itself, and the variance (2,) of its residuals."""
     count = min(count, len(sight.log.t))
@@ -213,13 +230,15 @@ _PAPER = {
     "reading": Setting("one_step", lambda value: value in NAMES, f"one of {', '.join(NAMES)}"),
     "d_max_share": Setting(D_MAX_SHARE, _number(0.0, 0.999), "a number above 0 and below 1"),
 }
-_LIKELIHOOD = {"d_max_share": _PAPER["d_max_share"]}
+_WHOLE = {"d_max_share": _PAPER["d_max_share"]}
 METHODS = {
     "batch": Method(batch, _PAPER),
     "recursive": Method(
         recursively,
         _PAPER | {"forgetting": Setting(1.0, _number(0.0, 1.0), "a number above 0 and at most 1")},
     ),
-    "maximum-likelihood": Method(likelihood, _LIKELIHOOD, alone=True),
+    "key-term-least-squares": Method(key_terms, _WHOLE),
+    "instrumental-variables": Method(instrumental, _WHOLE),
+    "maximum-likelihood": Method(likelihood, _WHOLE, alone=True),
 }
 """Every estimator by name."""

@@ -60,6 +60,24 @@ def test_identify_writes_a_model_that_is_right(folder):
     assert len(result["parameters"]) == 12
 
 
+def test_identify_bootstraps_with_a_seed(folder):
+    log = read_log(folder / "log.csv")
+    rows = zip(*(column[:120] for column in (log.t, log.u_r, log.u_l, log.x, log.y, log.theta)), strict=True)
+    text = "t,u_r,u_l,x,y,theta\n" + "".join(",".join(map(repr, map(float, row))) + "\n" for row in rows)
+    (folder / "short.csv").write_text(text)
+    found = jaxident("identify", folder / "short.csv", "--bootstrap", 40, "--seed", 3, "--json", folder / "b.json",
+                     "--report", folder / "b.html")  # fmt: skip
+    assert found.returncode == 0, found.stderr
+    assert "of 40 refits to resampled blocks" in found.stdout
+    result = json.loads((folder / "b.json").read_text())
+    own = {row["parameter"]: row for row in result["parameters"]}
+    for name, (low, high) in result["bootstrap"]["intervals"].items():
+        assert low < high
+        assert f"[{low:.6g}, {high:.6g}]" in found.stdout
+        assert name in own
+    assert "bootstrap 95 %" in (folder / "b.html").read_text(encoding="utf-8")
+
+
 def test_predict_writes_the_columns_of_the_contract(folder):
     result = jaxident("predict", folder / "model.json", folder / "log.csv", "--horizon", 30, "--out", folder / "p.csv")
     assert result.returncode == 0, result.stderr
@@ -90,6 +108,8 @@ def test_wrong_use(folder):
     refused(jaxident("identify", log, "--d-max", 7), "d-max 7")
     refused(jaxident("identify", log, "--method", "paper", "--coupling"), "coupling")
     refused(jaxident("identify", log, "--method", "paper", "--report", "x.html"), "--report needs")
+    refused(jaxident("identify", log, "--method", "paper", "--bootstrap", 50), "--bootstrap needs")
+    refused(jaxident("identify", log, "--method", "instrumental-variables", "--forgetting", 0.9), "forgetting")
     refused(jaxident("simulate", "published", "--out", "x.csv", cwd=folder), "--inputs LOG or --excitation NAME")
     refused(jaxident("predict", folder / "model.json", log, "--horizon", 5000, "--burn-in", 900, "--out", "x.csv",
                      cwd=folder), "burn-in of 900 rows")  # fmt: skip

@@ -5,6 +5,7 @@ import pytest
 
 from jaxident.array_types import Pose
 from jaxident.errors import InputError
+from jaxident.estimation.bootstrap import Bootstrap
 from jaxident.estimation.identify import Identification
 from jaxident.estimation.likelihood import Innovations
 from jaxident.estimation.maximum_likelihood import Fit
@@ -43,6 +44,16 @@ def test_page_holds_parameters_doubts_tests_and_pictures(tmp_path):
     write_identification(found._replace(suspicions=(), ok=False), logs, VERDICTS, tmp_path / "page.html")
     text = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "Nothing speaks against it. The fit did not converge" in text
+
+
+def test_page_shows_a_bootstraps_intervals_beside_the_likelihoods(tmp_path):
+    found, logs = made()
+    ends = np.array([[0.4321, 0.5678], [0.1234, 0.3456]])
+    again = Bootstrap(("rate_1", "dead_zone_r"), np.zeros((40, 2)), np.arange(40) > 0, np.eye(2), ends, "blocks", 17)
+    write_identification(found, logs, VERDICTS, tmp_path / "page.html", again)
+    text = (tmp_path / "page.html").read_text(encoding="utf-8")
+    for words in ("[0.49, 0.51]", "[0.4321, 0.5678]", "[0.1234, 0.3456]", "39 of 40 refits", "blocks of 17 residuals"):
+        assert words in text
 
 
 def test_the_papers_method_has_no_page(tmp_path):
