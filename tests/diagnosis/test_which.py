@@ -1,0 +1,41 @@
+"""Which set of effects is chosen, from candidates that are made up."""
+
+import pytest
+
+from jaxident.diagnosis.causes import which
+from jaxident.diagnosis.causes.which import Candidate
+
+FIRST, SECOND, OTHER = "turn_loss", "supply_sag", "transport_delay"
+
+
+@pytest.fixture
+def exchange(monkeypatch):
+    """The set chosen from sets and their gains; nothing further is tried."""
+    monkeypatch.setattr(which, "_scores", lambda data, solution, without: {})
+    monkeypatch.setattr(which, "_try", lambda found, data, begin, names, beside: None)
+
+    def chosen(gains, selected):
+        found = {effects: Candidate(effects, None, gain) for effects, gain in {(): 0.0, **gains}.items()}
+        return which._exchange(found, None, selected, ())
+
+    return chosen
+
+
+def test_a_set_that_is_worth_its_effects_stays(exchange):
+    gains = {(FIRST,): 1000.0, (SECOND,): 900.0, (FIRST, SECOND): 1200.0}
+    assert exchange(gains, (FIRST, SECOND)) == (FIRST, SECOND)
+
+
+def test_an_effect_that_brings_less_than_its_price_is_left_out(exchange):
+    """Its coordinate costs 4, the form of what is explained 10, to be claimed 9: 35 is enough, 20 is not."""
+    assert exchange({(FIRST,): 1000.0, (SECOND,): 900.0, (FIRST, SECOND): 1035.0}, (FIRST, SECOND)) == (FIRST, SECOND)
+    assert exchange({(FIRST,): 1000.0, (SECOND,): 900.0, (FIRST, SECOND): 1020.0}, (FIRST, SECOND)) == (FIRST,)
+
+
+def test_the_first_gives_way_to_one_that_fits_better_beside_the_second(exchange):
+    gains = {(FIRST,): 1000.0, (SECOND,): 900.0, (FIRST, SECOND): 1200.0, (SECOND, OTHER): 1400.0}
+    assert exchange(gains, (FIRST, SECOND)) == (SECOND, OTHER)
+
+
+def test_a_single_effect_has_nothing_to_exchange(exchange):
+    assert exchange({(FIRST,): 30.0, (SECOND,): 40.0}, (FIRST,)) == (FIRST,)
