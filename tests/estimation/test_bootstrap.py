@@ -95,6 +95,7 @@ def test_block_length_and_long_run_variance_follow_the_memory():
     assert variance[1] == pytest.approx(18.1, rel=0.3)
 
 
+@pytest.mark.slow
 def test_white_noise_gives_the_likelihoods_own_widths_and_coloured_noise_wider_ones():
     """80 replicates tell each of eight widths to 8 %, their root mean square better; blocks of 24 of 240 rows, after a
     fit of ten unknowns, to 20 %. AR(1) noise of 0.9 asks for two to four times wider intervals."""

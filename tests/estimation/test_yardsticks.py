@@ -81,6 +81,7 @@ def test_batch_is_the_loop(method):
         np.testing.assert_allclose(together[k], alone, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_instruments_stand_the_noise_that_biases_least_squares():
     """0.5 mm and 5 mrad, 24 seeds of 1000 rows: least squares loses the slow pole, instruments keep the heading's
     equation within what they claim. A ratio of squares of 24 trials, correlated parameters, lies below 1.5^2."""
