@@ -94,7 +94,7 @@ def diagnose(
     gap, where, shrinks = measure(prepared, finding, told, common, seed)
     judgement = judge(finding, gap, extra, common)
     known = answers(finding.data, finding.nominal, prepared.largest)
-    parameters = compare_parameters(prepared, finding, told)
+    parameters = compare_parameters(prepared, finding, told, common)
     verdict = decide(prepared, judgement, parameters)
     best, direct = finding.candidates[finding.selected].solution, direct_effects(prepared, finding, present)
     corrected = translate.to_model(prepared, best, finding.law, finding.selected, direct)
@@ -120,12 +120,21 @@ def search(prepared: Prepared) -> tuple[Prepared, Finding]:
     return prepared, finding
 
 
-def compare_parameters(prepared: Prepared, finding: Finding, given) -> list[Parameter]:
-    """Nominal parameters given (coordinates, None where none were) and refitted, in the user's units."""
+def compare_parameters(prepared: Prepared, finding: Finding, given, common: tuple[str, ...] = ()) -> list[Parameter]:
+    """Nominal parameters given (coordinates, None where none were) and refitted, in the user's units; then those of the
+    effects that the given model has in common with the robot: the right effect may have the wrong size."""
     best = finding.candidates[finding.selected].solution
     names, values, deviations = translate.parameters_of(best, prepared.largest)
     told = [None] * len(names) if given is None else translate.in_user_units(given, prepared.largest)
-    return [Parameter(*row) for row in zip(names, told, values, deviations, strict=True)]
+    rows = [Parameter(*row) for row in zip(names, told, values, deviations, strict=True)]
+    for name in (name for name in finding.selected if name in common):
+        effect = translate.effect_of(name, best, prepared.largest)
+        before = translate.effect_values(name, given, prepared.largest)
+        rows += [
+            Parameter(f"{name} {key}", before[key], effect.parameters[key], deviation)
+            for key, deviation in (effect.standard_deviation or {}).items()
+        ]
+    return rows
 
 
 def decide(prepared: Prepared, judgement: Judgement, parameters: list[Parameter]) -> str:

@@ -9,6 +9,7 @@ from jaxident.diagnosis.causes.which import Finding, search_effects
 from jaxident.diagnosis.noise import Law
 from jaxident.diagnosis.prepare import Prepared, prepare
 from jaxident.diagnosis.translate import to_coordinates
+from jaxident.effects.checks import check_effects
 from jaxident.errors import InputError
 from jaxident.log import Log, join
 from jaxident.robot.model import Model
@@ -63,7 +64,8 @@ def inspect_simulator(sim: Log | Sequence[Log], prepared: Prepared, finding: Fin
 
 
 def as_simulator(model: Model, logs: Log | Sequence[Log]) -> Simulator:
-    """A model as the simulator of some logs' commands."""
+    """A model as the simulator of some logs' commands. InputError for effects that `check_effects` refuses."""
+    check_effects(model.effects)
     return Simulator(to_coordinates(model, logs), tuple(effect.name for effect in model.effects))
 
 

@@ -20,6 +20,7 @@ from jaxident.diagnosis.motion.coordinates import (
 )
 from jaxident.diagnosis.noise import Law
 from jaxident.diagnosis.prepare import Prepared
+from jaxident.effects.catalogue import by_name, to_vector
 from jaxident.log import Log, join
 from jaxident.robot.drive import Physical
 from jaxident.robot.model import Effect, Model, Provenance, require_physical
@@ -36,12 +37,12 @@ def to_coordinates(model: Model, logs: Log | Sequence[Log]) -> np.ndarray:
     largest = float(np.nanmax(np.abs(np.stack(join(logs).command))))
     point = nominal_vector(drive, np.asarray(model.dead_zone))
     vector = neutral_vector(np.concatenate([point[:2], point[2:] / largest ** _POWERS[2:]]))
-    for effect in model.effects:
-        if effect.name in COORDINATES:
-            factors = unit_factors(effect.name, largest)
-            values = from_catalogue(effect.name, {key: v / factors[key] for key, v in effect.parameters.items()})
-            for key, value in values.items():
-                vector[PLACES[effect.name, key]] = value
+    whole = by_name(np.asarray(to_vector(model.effects)))
+    for name in (effect.name for effect in model.effects if effect.name in COORDINATES):
+        factors = unit_factors(name, largest)
+        values = from_catalogue(name, {key: float(v) / factors[key] for key, v in whole[name].items()})
+        for key, value in values.items():
+            vector[PLACES[name, key]] = value
     return vector
 
 
@@ -63,8 +64,7 @@ def effect_of(name: str, solution: Solution, largest: float) -> Effect:
     """One effect of a solution with standard deviations, in the user's unit; deviations to first order."""
     coordinates = [c.name for c in COORDINATES[name]]
     here = {key: solution.vector[PLACES[name, key]] for key in coordinates}
-    factors = unit_factors(name, largest)
-    values = {key: v * factors[key] for key, v in to_catalogue(name, here).items()}
+    factors, values = unit_factors(name, largest), effect_values(name, solution.vector, largest)
     places = [solution.places.index(PLACES[name, key]) for key in coordinates if PLACES[name, key] in solution.places]
     if not places:  # looked for on a grid alone
         return Effect(name, values)
@@ -78,6 +78,13 @@ def effect_of(name: str, solution: Solution, largest: float) -> Effect:
     slope = np.array(slopes)
     spread = np.sqrt(np.maximum(np.einsum("ap,ab,bp->p", slope, own, slope), 0.0))
     return Effect(name, values, dict(zip(values, spread.tolist(), strict=True)))
+
+
+def effect_values(name: str, vector: Array, largest: float) -> dict[str, float]:
+    """Parameters of an effect at coordinates (SIZE,), in the user's unit."""
+    factors = unit_factors(name, largest)
+    found = to_catalogue(name, {c.name: vector[PLACES[name, c.name]] for c in COORDINATES[name]})
+    return {key: value * factors[key] for key, value in found.items()}
 
 
 def to_model(

@@ -1,8 +1,11 @@
 """A simulator in other units than the robot is refused with a word on which; a model serves as one."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from jaxident.diagnosis.diagnose import compare_parameters
 from jaxident.diagnosis.motion.coordinates import PLACES, neutral_vector
 from jaxident.diagnosis.simulator import Simulator, as_simulator, check_units, shared
 from jaxident.errors import InputError
@@ -44,6 +47,7 @@ def test_a_model_with_effects_is_a_simulator():
         Effect("input_saturation", {"level": 72.0}),
         Effect("transport_delay", {"delay": 0.12}),
         Effect("slope", {"acceleration": 0.2, "direction": np.pi / 2}),
+        Effect("mass_offset", {"along": 0.1}),
         Effect("coloured_noise", {"correlation_time": 0.5, "position": 1e-3, "heading": 1e-2}),
     )
     gain = np.array([[0.01, 0.01], [0.1, -0.1]])
@@ -53,6 +57,7 @@ def test_a_model_with_effects_is_a_simulator():
     expected[PLACES["input_saturation", "level"]] = 0.8
     expected[PLACES["transport_delay", "delay"]] = 0.12
     expected[PLACES["slope", "y"]] = 0.2
+    expected[PLACES["mass_offset", "along"]] = 0.1
     np.testing.assert_allclose(found.vector, expected, atol=1e-12)
     assert found.effects == tuple(effect.name for effect in effects)
 
@@ -61,3 +66,19 @@ def test_effects_in_common_are_no_gap():
     simulator = Simulator(np.zeros(3), ("slope", "turn_loss"))
     assert shared(("transport_delay", "slope"), simulator) == (("slope",), ("turn_loss",))
     assert shared(("slope",), None) == ((), ())
+
+
+def test_the_right_effect_of_the_wrong_size_is_a_parameter():
+    """The model has a delay of 0.05 s, the robot one of 0.10 +- 0.01 s; commands up to 90 leave seconds alone."""
+    place = PLACES["transport_delay", "delay"]
+    given, fitted = (neutral_vector(np.ones(10)) for _ in range(2))
+    given[place], fitted[place] = 0.05, 0.10
+    solution = SimpleNamespace(vector=fitted, places=[*range(10), place], covariance=1e-4 * np.eye(11))
+    finding = SimpleNamespace(
+        selected=("transport_delay",), candidates={("transport_delay",): SimpleNamespace(solution=solution)}
+    )
+    prepared = SimpleNamespace(largest=90.0)
+    last = compare_parameters(prepared, finding, given, ("transport_delay",))[-1]
+    assert last.name == "transport_delay delay"
+    np.testing.assert_allclose(last[1:], [0.05, 0.10, 0.01], rtol=1e-6)
+    assert len(compare_parameters(prepared, finding, given)) == 10
