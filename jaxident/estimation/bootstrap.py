@@ -75,12 +75,12 @@ def bootstrap(
     """Replicates of a maximum-likelihood fit `found` to `logs`, and 95 % intervals from them.
 
     block: rows, by default from the innovations' correlation (`block_length`). d_max as given to `identify`. InputError
-    for the method 'paper', too few replicates or runs, or a block that no run holds; WorkError where fewer than half
+    for other methods, too few replicates or runs, or a block that no run holds; WorkError where fewer than half
     the refits arrive. Needs double precision.
     """
     require_float64("bootstrap")
     if found.fit is None:
-        raise InputError("bootstrap: a property of maximum likelihood; the method 'paper' has none")
+        raise InputError("bootstrap: a property of maximum likelihood; other methods have none")
     if count < SMALLEST_COUNT:
         raise InputError(f"bootstrap: {count} replicates; a standard deviation needs at least {SMALLEST_COUNT}")
     log = join(logs)

@@ -28,7 +28,7 @@ def write_identification(
     """Write the page of a maximum-likelihood fit to some logs, a bootstrap's intervals beside its own where there is
     one; returns its path. InputError for another method."""
     if found.fit is None:
-        raise InputError("report: a page is written for maximum likelihood; the method 'paper' has none")
+        raise InputError("report: a page is written for maximum likelihood; other methods have none")
     write_page(_page(found, join(logs), verdicts, again), path)
     return [os.fspath(path)]
 
