@@ -64,7 +64,7 @@ ENTRIES = (
     _row("marker_offset", "[x, y] += R(theta) [a, b]",
          (Parameter("ahead", "m", 0.0, (-0.1, 0.1), 0.02), Parameter("left", "m", 0.0, (-0.1, 0.1), 0.01)),
          (ALONG, LATERAL), ("lateral_slip",), "rigid body kinematics; Borenstein, Everett, Feng 1996"),
-    _row("heading_offset", "theta += c", (Parameter("offset", "rad", 0.0, (-0.2, 0.2), 0.05),), (HEADING,), (),
+    _row("heading_offset", "theta += c", (Parameter("offset", "rad", 0.0, (-0.2, 0.2), 0.05),), (LATERAL,), (),
          "mounting of the marker; Censi et al. 2013, IEEE TRO 29"),
     _row("camera_scale", "x (1 + d / 2), y (1 - d / 2)",
          (Parameter("difference", "", 0.0, (-0.1, 0.1), 0.04, least=-2.0, most=2.0),), (ALONG, LATERAL),

@@ -27,6 +27,7 @@ def diagnosis_to_dict(found: Diagnosis) -> dict[str, Any]:
         "where": {
             "site": judgement.sites,
             "channels": found.where.channels,
+            "excess": found.where.excess,
             "regions": [_region(region, found.prepared.largest) for region in found.where.regions],
         },
         "causes": _causes(found),

@@ -97,7 +97,7 @@ def _doubt(found: Diagnosis) -> str:
 
 def _place(found: Diagnosis) -> str:
     """The largest channel and the most probable site."""
-    channel, share = max(found.where.channels.items(), key=lambda pair: pair[1])
+    channel, share = max(found.where.excess.items(), key=lambda pair: pair[1])
     site, likely = max(found.judgement.sites.items(), key=lambda pair: pair[1])
     seen = f"{percent(share)} of it shows {words.CHANNELS[channel]}" if share > 0.0 else ""
     looks = f"it looks like something {SITES[site]}" if likely > 0.0 and site != "time" else ""
@@ -159,13 +159,17 @@ GAP_CAPTION = (
 def _where(found: Diagnosis) -> Section:
     """Channels, the map, the regions that stand out, and the sites."""
     place, largest, channels = found.where, found.prepared.largest, words.CHANNELS
-    if any(share > 0.0 for share in place.channels.values()):
-        shares = ", ".join(f"{percent(share)} is {channels[name]}" for name, share in place.channels.items())
+    beyond = any(share > 0.0 for share in place.excess.values())
+    if beyond:
+        shares = ", ".join(f"{percent(share)} is {channels[name]}" for name, share in place.excess.items())
         text = f"Of the nominal model's error beyond the floor, parameters refitted, {shares}."
     else:
         text = "The nominal model's error does not lie above the floor in any channel."
+    if found.selected and place.channels != place.excess:
+        shares = ", ".join(f"{percent(share)} is {channels[name]}" for name, share in place.channels.items())
+        text += f" Of what {together(found.selected)} adds to the poses, all else alike, {shares}."
     blocks: list = [text]
-    if place.table and any(share > 0.0 for share in place.channels.values()):
+    if place.table and beyond:
         blocks += [MAP, _map(found)]
     rows = [
         (_variable(region.variable), *(_scaled(end, region.variable, largest) for end in (region.low, region.high)),

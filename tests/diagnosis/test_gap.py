@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from support.arcs import along_arcs
 
 from jaxident.diagnosis.extent import gap
 from jaxident.diagnosis.extent.floor import Floor
 from jaxident.diagnosis.extent.shrink import interval, shrink_of
-from jaxident.diagnosis.extent.where import Region, _discoveries, _regions
+from jaxident.diagnosis.extent.where import Region, _discoveries, _regions, increments
 
 COUNT = 90
 NOTHING = np.zeros(400)
@@ -128,3 +129,14 @@ def test_false_regions_stay_below_their_rate():
 def test_adjusted_probabilities_are_those_of_benjamini_and_hochberg():
     given = [Region("v", 0.0, 1.0, 0.5, p) for p in (0.001, 0.02, 0.2, 0.8)]
     assert sorted(round(region.p_value, 6) for region in _discoveries(given)) == [0.004, 0.04]
+
+
+def test_a_turned_marker_looks_like_sideways_movement():
+    windows, turned = along_arcs(40, 3, 40), np.zeros((3, 40, 3))
+    turned[..., 2] = -0.1
+    along, lateral, heading = increments(np.zeros((3, 120)), windows)
+    seen = increments(turned.reshape(3, -1), windows)
+    np.testing.assert_allclose(seen[0], along * np.cos(0.1) + lateral * np.sin(0.1), atol=1e-12)
+    np.testing.assert_allclose(seen[1], lateral * np.cos(0.1) - along * np.sin(0.1), atol=1e-12)
+    np.testing.assert_allclose(seen[2], heading, atol=1e-12)
+    assert np.abs(along).max() > 0.0

@@ -102,9 +102,14 @@ def in_channels(error: Array, residual: Array, windows: Windows, law: Law) -> np
     sine, cosine = np.sin(heading), np.cos(heading)
     x, y, theta = error[:, 0], error[:, 1], error[:, 2]
     turned = np.stack([cosine * x + sine * y, -sine * x + cosine * y, theta], axis=1)
+    return turned / deviations(law)[:, None]
+
+
+def deviations(law: Law) -> np.ndarray:
+    """The camera's deviations (3,), white and coloured together, along, lateral [m] and in heading [rad]."""
     position, angle = law.coloured or (0.0, 0.0)
     flat = np.hypot(law.position, position)
-    return turned / np.array([flat, flat, np.hypot(law.heading, angle)])[:, None]
+    return np.array([flat, flat, np.hypot(law.heading, angle)])
 
 
 def _scale(normal: Array) -> np.ndarray:

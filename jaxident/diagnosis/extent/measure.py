@@ -8,10 +8,10 @@ from jaxident.diagnosis.causes.search import Solution
 from jaxident.diagnosis.causes.unexplained import UNEXPLAINED
 from jaxident.diagnosis.causes.which import Finding
 from jaxident.diagnosis.extent.floor import Floor, floor_of, wander_of
-from jaxident.diagnosis.extent.gap import ends_of, last_errors, settle
+from jaxident.diagnosis.extent.gap import deviations, ends_of, last_errors, settle
 from jaxident.diagnosis.extent.shrink import HIGH, LOW, Shrink, shrink_of
-from jaxident.diagnosis.extent.where import Place, locate
-from jaxident.diagnosis.motion.coordinates import COORDINATES
+from jaxident.diagnosis.extent.where import Place, increments, locate
+from jaxident.diagnosis.motion.coordinates import COORDINATES, NOMINAL, PLACES, neutral_vector
 from jaxident.diagnosis.motion.linear import follow
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.motion.windows import Windows, cut
@@ -67,7 +67,27 @@ def measure(prepared: Prepared, finding: Finding, given, common, seed: int = 0) 
               found[:3], replay)  # fmt: skip
     floor = np.full(found[1].shape, np.nan)
     floor[np.asarray(windows.seen)[-1]] = replay.channels
-    return gap, locate(found[1], floor, residual, windows, seed), shrinks
+    moved = moved_by(finding, common, starts, windows, law)
+    return gap, locate(found[1], floor, residual, windows, moved, seed), shrinks
+
+
+def moved_by(finding: Finding, common: tuple[str, ...], starts, windows: Windows, law: Law) -> np.ndarray | None:
+    """Squares (windows, 3) over the camera's variances of what the selected effects add to the movement along, sideways
+    and in heading from row to row, all else alike; None without such effects or where they explain too little.
+
+    The refitted nominal model's own error would say less: its parameters bend until some of what an effect does in
+    one channel lies in another, and an error of heading soon lies sideways.
+    """
+    own = {name for name in finding.selected if name not in common}
+    if not own or finding.unexplained > UNEXPLAINED:
+        return None
+    best = finding.candidates[finding.selected].solution.vector
+    places = [place for (name, _), place in PLACES.items() if name in own]
+    without = np.array(best)
+    without[places] = neutral_vector(best[: len(NOMINAL)])[places]
+    both = follow(np.stack([best, without]), np.stack([starts, starts]), windows)
+    added = np.subtract(*(increments(residual, windows) for residual in both))
+    return np.sum(added**2, axis=2).T / deviations(law) ** 2
 
 
 def _with(finding: Finding, common: tuple[str, ...]) -> Solution:

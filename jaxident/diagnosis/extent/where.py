@@ -29,22 +29,43 @@ class Region(NamedTuple):
 
 
 class Place(NamedTuple):
-    """Shares of the excess by channel; regions, largest share first; and the map: for each variable the bins' edges and
-    the mean excess in each."""
+    """excess: shares of the nominal model's error beyond the floor by channel. channels: shares of what the selected
+    effects move; of the excess where there are none. regions: largest share first. table, the map: for each variable
+    the bins' edges and the mean excess in each."""
 
     channels: dict[str, float]
+    excess: dict[str, float]
     regions: list[Region]
     table: dict[str, tuple[Any, Any]]
 
 
-def locate(errors: Array, floor: Array, residual: Array, windows: Windows, seed: int = 0) -> Place:
-    """From errors and their floor (windows, 3) at the horizon, and the residuals (windows, numbers) of that model."""
+def locate(
+    errors: Array, floor: Array, residual: Array, windows: Windows, moved: Array | None = None, seed: int = 0
+) -> Place:
+    """From the nominal model's squared errors and their floor (windows, 3) at the horizon, the residuals (windows,
+    numbers) of the best one, and the squares that its effects move (windows, 3), None without effects."""
     kept = np.isfinite(errors).all(axis=1)
     excess = (errors - floor)[kept]
-    total = np.maximum(excess.mean(axis=0), 0.0)
-    share = total / total.sum() if total.sum() > 0.0 else np.zeros(3)
     variables = {name: value[kept] for name, value in describe(residual, windows).items()}
-    return Place(dict(zip(CHANNELS, share.tolist(), strict=True)), *_regions(excess.mean(axis=1), variables, seed))
+    beyond = _shares(excess)
+    acting = beyond if moved is None else _shares(moved[kept])
+    return Place(acting, beyond, *_regions(excess.mean(axis=1), variables, seed))
+
+
+def _shares(squares: Array) -> dict[str, float]:
+    """Of each channel in the mean of squares (windows, 3); zero where nothing is left."""
+    total = np.maximum(squares.mean(axis=0), 0.0)
+    share = total / total.sum() if total.sum() > 0.0 else np.zeros(len(CHANNELS))
+    return dict(zip(CHANNELS, share.tolist(), strict=True))
+
+
+def increments(residual: Array, windows: Windows) -> np.ndarray:
+    """Modelled movement along, sideways and in heading (3, windows, rows - 1) from row to row, as the robot's own
+    heading half-way sees it."""
+    dx, dy, turned = (np.diff(column, axis=1) for column in modelled_path(residual, windows))
+    direction = modelled_path(residual, windows)[2][:, :-1] + 0.5 * turned
+    sine, cosine = np.sin(direction), np.cos(direction)
+    return np.stack([cosine * dx + sine * dy, -sine * dx + cosine * dy, turned])
 
 
 def describe(residual: Array, windows: Windows) -> dict[str, np.ndarray]:
@@ -52,11 +73,10 @@ def describe(residual: Array, windows: Windows) -> dict[str, np.ndarray]:
     x, y, theta = modelled_path(residual, windows)
     step = np.asarray(windows.step).T
     rows = np.arange(step.shape[1])
+    along, _, turned = increments(residual, windows)
+    v, w = along / step[:, :-1], turned / step[:, :-1]
     places = np.minimum(windows.first + rows[:, None], len(windows.command) - 1)
     u = np.asarray(windows.command)[places, windows.run]
-    direction = theta[:, :-1] + 0.5 * np.diff(theta, axis=1)
-    v = (np.diff(x, axis=1) * np.cos(direction) + np.diff(y, axis=1) * np.sin(direction)) / step[:, :-1]
-    w = np.diff(theta, axis=1) / step[:, :-1]
     return {
         "u_r": u[..., 0].mean(axis=0), "u_l": u[..., 1].mean(axis=0),
         "|u|": np.abs(u).mean(axis=(0, 2)), "largest |u|": np.abs(u).max(axis=(0, 2)),
