@@ -1,11 +1,14 @@
-"""Effects injected into the poses of real logs: does the diagnosis of these against the originals name them?
+"""Real robots as they are, and with effects injected into the poses of their logs: are these named?
 
-    python -m experiments.withheld.inject --data ../shared/data --robot create_1 --out injected
+    python -m experiments.withheld.inject --data ../shared/data --robots create_1 husky --out real/cases
+    python -m experiments.withheld diagnose --cases real/cases --found real/found
+    python -m experiments.withheld collect --found real/found --out experiments/withheld/real
 
-writes a folder per effect, `injected/create_1/NAME/`: `real_*`, logs with the effect, and `sim_*`, untouched logs of
-the same robot for `jaxident diagnose --sim`; and beside the folders `answers.json`. Even and odd parts of a log go
-one to each, so that both share the robot and the day but no row. `none` is the pair without an effect. Only what the
-camera does to poses can be injected afterwards; camera latency is `transport_delay` seen from outside.
+writes a folder for every robot, `real/cases/create_1/real_*`, and for every effect `real/cases/create_1_NAME/`:
+`real_*`, logs with the effect, and `sim_*`, untouched logs of the same robot, for `jaxident diagnose --sim`. Even and
+odd parts of a log go one to each, so that both share the robot and the day but no row. `none` is the pair without an
+effect. Only what the camera does to poses can be injected afterwards; camera latency is `transport_delay` seen from
+outside.
 """
 
 import argparse
@@ -90,30 +93,35 @@ def read_robot(data: pathlib.Path, robot: str) -> list[Log]:
 
 
 def write_pair(runs: list[Log], name: str, size: dict[str, float], folder: pathlib.Path, seed: int) -> None:
-    """Even runs with the effect as real_1, odd ones untouched as sim_1; several runs to a file where they are many."""
-    folder.mkdir(parents=True, exist_ok=True)
+    """Even runs with the effect as real_*, odd ones untouched as sim_*."""
     rng = np.random.default_rng([seed, *name.encode()])
-    for label, part in (("real", [inject(run, name, size, rng) for run in runs[::2]]), ("sim", runs[1::2])):
-        groups = [part] if len(part) > PARTS else [[run] for run in part]
-        for number, group in enumerate(groups, start=1):
-            ji.write_log(join(group), folder / f"{label}_{number}.csv.gz")
+    write(folder, "real", [inject(run, name, size, rng) for run in runs[::2]])
+    write(folder, "sim", runs[1::2])
+
+
+def write(folder: pathlib.Path, label: str, runs: list[Log]) -> None:
+    """A file for each run; one for all of them where they are many."""
+    folder.mkdir(parents=True, exist_ok=True)
+    groups = [runs] if len(runs) > PARTS else [[run] for run in runs]
+    for number, group in enumerate(groups, start=1):
+        ji.write_log(join(group), folder / f"{label}_{number}.csv.gz")
 
 
 def main() -> None:
-    """Write every injection of a robot."""
+    """Write every robot, and every injection into its logs."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=pathlib.Path, required=True)
-    parser.add_argument("--robot", default="create_1", help="create_1 to create_5, or husky")
+    parser.add_argument("--robots", nargs="+", default=["create_1"], help="create_1 to create_5, husky")
     parser.add_argument("--out", type=pathlib.Path, required=True)
     parser.add_argument("--sizes", type=json.loads, default={}, help='such as {"heading_offset": {"offset": 0.02}}')
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    runs, sizes = read_robot(options.data, options.robot), SIZES | options.sizes
-    folder = options.out / options.robot
-    for name, size in sizes.items():
-        write_pair(runs, name, size, folder / name, options.seed)
-        print(f"wrote {folder / name}")
-    (folder / "answers.json").write_text(json.dumps(sizes, indent=1) + "\n")
+    for robot in options.robots:
+        runs = read_robot(options.data, robot)
+        write(options.out / robot, "real", runs)
+        for name, size in (SIZES | options.sizes).items():
+            write_pair(runs, name, size, options.out / f"{robot}_{name}", options.seed)
+        print(f"wrote {robot}", flush=True)
 
 
 if __name__ == "__main__":
