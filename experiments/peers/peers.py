@@ -4,7 +4,8 @@
     peers_env/bin/python experiments/peers/peers.py --data peers/data.npz --out peers/theirs.npz
 
 Unknown are two rates, four gains and two dead zones; wherever a tool allows it, the five start states too. What a tool
-lacks it is given: the simulator below, the camera's noise, and a start about half off (each number times exp(0.5 z), z normal).
+lacks it is given: the simulator below, the camera's noise, and a start about half off: each number times exp(z / 2), z
+normal.
 """
 
 import argparse
