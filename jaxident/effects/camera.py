@@ -5,7 +5,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array, Pose
-from jaxident.effects.entry import ALONG, EVERYWHERE, HEADING, LATERAL, Entry, Parameter
+from jaxident.effects.entry import ALONG, EVERYWHERE, LATERAL, Entry, Parameter
 from jaxident.numerics import sin_cos
 
 

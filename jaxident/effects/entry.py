@@ -39,8 +39,9 @@ class Entry(NamedTuple):
     """One effect of the catalogue.
 
     equation: with the symbols of README, primes for time derivatives. channels: those of along, lateral, heading
-    in which it changes the movement from row to row, as the reported heading sees it. confused_with: effects that inputs separate badly. smooth: whether the simulation has a
-    derivative at neutral; where not, `grid` holds values of the first parameter to try instead. random: needs a key.
+    in which it changes the movement from row to row, as the reported heading sees it. confused_with: effects that
+    inputs separate badly. smooth: whether the simulation has a derivative at neutral; where not, `grid` holds values
+    of the first parameter to try instead. random: needs a key.
     """
 
     name: str

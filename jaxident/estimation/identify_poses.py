@@ -9,9 +9,10 @@ import numpy as np
 from jaxident.array_types import Pose
 from jaxident.errors import InputError, WorkError
 from jaxident.estimation.maximum_likelihood import Fit
-from jaxident.estimation.noise_law import WHITE, fit_law, whiteness
+from jaxident.estimation.noise_law import WHITE, fit_law
 from jaxident.estimation.parameters import Law, names, to_vector
 from jaxident.estimation.precision import difference_covariance, spread_of
+from jaxident.estimation.residual_tests import whiteness
 from jaxident.estimation.runs import Runs, stack_runs
 from jaxident.estimation.suspicions import log_suspicions
 from jaxident.log import Log
@@ -83,7 +84,7 @@ def _model(fit: Fit, law: Law, period: float) -> Model:
 
 def _suspicions(fit: Fit, runs: Runs) -> tuple[str, ...]:
     """A line where the residuals are not white: the intervals are then too narrow."""
-    found = float(whiteness(fit.innovations.normalised, jnp.asarray(runs.seen)))
+    found = float(np.sum(whiteness(fit.innovations.normalised, runs.seen)))
     if found < WHITE:
         return ()
     return (

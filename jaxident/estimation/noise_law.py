@@ -1,13 +1,12 @@
 """Which noise law the data ask for: white camera error where the residuals are white, else the likeliest law."""
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.errors import InputError
 from jaxident.estimation.maximum_likelihood import Fit, begin, fit_from
 from jaxident.estimation.parameters import Law, names
+from jaxident.estimation.residual_tests import whiteness
 from jaxident.estimation.runs import Runs
 
 NOISE_LAWS = {
@@ -18,7 +17,6 @@ NOISE_LAWS = {
 }
 """White camera error; with a memory; white and random slip; both."""
 
-LAGS = (1, 2, 4, 8, 16)
 WHITE = 30.6
 """Largest sum of squared residual correlations, 15 of them, of white residuals: chi-squared, 1 in 100."""
 
@@ -38,7 +36,7 @@ def fit_law(runs: Runs, d_max: Array, noise_law: str, coupling: bool) -> tuple[F
         for law in (NOISE_LAWS[name]._replace(coupling=coupling) for name in laws):
             tried.append((fit_from(beginning, runs, d_max, law), law))
         fit, law = min(tried, key=lambda pair: criterion(pair[0], pair[1], 3 * int(np.sum(runs.seen))))
-        if bool(fit.ok) and float(whiteness(fit.innovations.normalised, runs.seen)) < WHITE:
+        if bool(fit.ok) and np.sum(whiteness(fit.innovations.normalised, runs.seen)) < WHITE:
             break
     return fit, law
 
@@ -47,17 +45,3 @@ def criterion(fit: Fit, law: Law, count: int) -> float:
     """Bayesian information criterion of a fit to `count` numbers; infinite where the fit failed."""
     value = -2.0 * float(fit.log_likelihood) + len(names(law)) * np.log(count)
     return value if bool(fit.ok) and np.isfinite(value) else np.inf
-
-
-@jax.jit
-def whiteness(normalised: Array, seen: Array) -> Array:
-    """Sum over three channels and LAGS of n r^2, r the correlation of innovations (runs, 3, rows) at a lag: about
-    chi-squared with 15 degrees of freedom for white ones (Box and Pierce 1970)."""
-    total = jnp.zeros(())
-    for lag in LAGS:
-        both = (seen[:, lag:] & seen[:, :-lag])[:, None]
-        product = jnp.where(both, normalised[..., lag:] * normalised[..., :-lag], 0.0)
-        pairs = jnp.maximum(jnp.sum(both), 1)
-        power = jnp.sum(normalised**2, axis=(0, 2)) / jnp.maximum(jnp.sum(seen), 1)
-        total = total + jnp.sum((jnp.sum(product, axis=(0, 2)) / power) ** 2) / pairs
-    return total

@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxident.estimation.noise_law import LAGS
 from jaxident.log import Log
 
 CHANNELS = ("x", "y", "theta")
+LAGS = (1, 2, 4, 8, 16)
 WHITE_CHANNEL = 15.1
-"""Largest sum of squared residual correlations at the five LAGS: chi-squared, 1 in 100 (Box and Pierce 1970)."""
+"""Largest whiteness of a channel's white residuals: chi-squared with a degree of freedom per lag, 1 in 100."""
 INPUT_LAGS = (0, 1, 2, 4, 8, 16)
 UNRELATED = 3.34
 """Largest of 12 correlations with commands, in standard deviations: 1 in 100 of white residuals at most."""
@@ -59,11 +59,18 @@ def correlations(normalised: np.ndarray, seen: np.ndarray, lags: Any) -> np.ndar
     return np.stack(columns, axis=1) / np.maximum(power, 1e-300)[:, None]
 
 
+def whiteness(normalised: Any, seen: Any) -> np.ndarray:
+    """Sum (3,) over LAGS of n r^2, r the correlation of residuals (runs, 3, rows) at a lag and n the poses seen (runs,
+    rows): about chi-squared for white ones (Box and Pierce 1970)."""
+    normalised, seen = np.asarray(normalised), np.asarray(seen)
+    return max(int(np.sum(seen)), 1) * np.sum(correlations(normalised, seen, LAGS) ** 2, axis=1)
+
+
 def residual_tests(normalised: np.ndarray, seen: np.ndarray, command: Any) -> list[ResidualTest]:
     """Whiteness, independence of the commands and outliers, for each channel; residuals over their deviations (runs, 3,
     rows), seen (runs, rows), command two of (runs, rows)."""
     count = max(int(np.sum(seen)), 1)
-    white = count * np.sum(correlations(normalised, seen, LAGS) ** 2, axis=1)
+    white = whiteness(normalised, seen)
     related = _related(normalised, seen, command)
     far = np.sum((np.abs(normalised) > FAR) & seen[:, None], axis=(0, 2)) / count
     rows = []
