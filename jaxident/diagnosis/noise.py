@@ -16,6 +16,7 @@ from jaxident.diagnosis.motion.windows import Windows
 MOST_STEPS = 12
 SAMPLE, ROWS = 60, 20
 """Windows from which noise is sized, spread evenly, and rows of each: slip is slow, and few rows show it."""
+EVERY = slice(None)
 SLIP_TIMES = (0.05, 0.2, 0.8)
 CAMERA_TIMES = (0.1, 0.5)
 HOPE = 5.0
@@ -56,12 +57,13 @@ def first_law(windows: Windows) -> Law:
     return Law(max(float(np.hypot(found[0], found[1])) / 2.0**0.5, 1e-7), max(found[2], 1e-7))
 
 
-def covariance(law: Law, windows: Windows, responses: Responses) -> np.ndarray:
-    """Covariance (windows, numbers, numbers) of the poses; unseen ones stand alone with variance 1."""
-    parts = _parts(law.slip_time, law.coloured_time, windows, responses)
+def covariance(law: Law, windows: Windows, responses: Responses, numbers: slice = EVERY) -> np.ndarray:
+    """Covariance (windows, numbers, numbers) of the poses, or of some numbers of each window; unseen ones stand alone
+    with variance 1."""
+    parts = _parts(law.slip_time, law.coloured_time, windows, responses, numbers)
     variances = [law.position, law.heading, *(law.slip or ()), *(law.coloured or ())]
     total = sum(sd**2 * part for sd, part in zip(variances, parts, strict=True))
-    return total + _alone(windows)
+    return total + _alone(windows, numbers)
 
 
 def whitener_of(law: Law, windows: Windows, responses: Responses) -> np.ndarray:
@@ -144,7 +146,7 @@ def _size(given, begin: Law, slip_time: float | None, coloured_time: float | Non
     return Sized(Law(float(sd[0]), float(sd[1]), slip, slip_time, coloured, coloured_time), value)
 
 
-def _parts(slip_time, coloured_time, windows: Windows, responses: Responses, numbers=slice(None)) -> list[np.ndarray]:
+def _parts(slip_time, coloured_time, windows: Windows, responses: Responses, numbers=EVERY) -> list[np.ndarray]:
     """What each variance multiplies, for some of the numbers."""
     seen = _numbers_seen(windows)
     channel, rows = (np.arange(seen.shape[1]) % 3)[numbers], (np.arange(seen.shape[1]) // 3)[numbers]
@@ -173,7 +175,7 @@ def _numbers_seen(windows: Windows) -> np.ndarray:
     return np.repeat(np.asarray(windows.seen).T, 3, axis=1).astype(float)
 
 
-def _alone(windows: Windows, numbers=slice(None)) -> np.ndarray:
+def _alone(windows: Windows, numbers=EVERY) -> np.ndarray:
     """Variance 1 for numbers that were not seen."""
     unseen = 1.0 - _numbers_seen(windows)[:, numbers]
     return unseen[:, :, None] * np.eye(unseen.shape[1])

@@ -5,7 +5,7 @@ import pytest
 from support.arcs import along_arcs
 
 from jaxident.diagnosis.extent.floor import REPLAYS, floor_of
-from jaxident.diagnosis.extent.gap import ends_of
+from jaxident.diagnosis.extent.gap import early_inverse, ends_of
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.noise import Law
 
@@ -18,7 +18,7 @@ REMEMBERING = Law(5e-4, 4e-3, coloured=(1e-3, 5e-3), coloured_time=0.3)
 def floor(law, stride, doubt=0.0):
     windows, nothing = along_arcs(ROWS, COUNT, stride), np.zeros((COUNT, 3 * ROWS))
     responses = respond(np.exp(VECTOR), nothing, windows)
-    ends = ends_of(VECTOR, nothing, windows, law, responses, BURN)
+    ends = ends_of(VECTOR, nothing, windows, early_inverse(law, windows, responses, BURN))
     variances = 2 + 2 * (law.slip is not None) + 2 * (law.coloured is not None)
     return floor_of(nothing, windows, law, doubt * np.eye(variances), responses, ends)
 

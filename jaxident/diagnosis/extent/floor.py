@@ -47,11 +47,11 @@ def floor_of(
     return Floor(float(np.mean(channels)), squares.mean(axis=(0, 1)), channels)
 
 
-def wander_of(solution: Solution, windows: Windows, law: Law, responses: Responses, burn: int, seed: int = 0) -> Array:
+def wander_of(solution: Solution, windows: Windows, law: Law, inverse: Array, seed: int = 0) -> Array:
     """Mean squared errors (replays,) that the uncertainty of a fit's own parameters makes at the horizon of its
-    windows, over the camera's variance: the least that a corrected model can miss."""
+    windows, over the camera's variance: the least that a corrected model can miss; inverse: `gap.early_inverse`."""
     linear = solution.linear
-    ends = ends_of(solution.vector, linear.residual, windows, law, responses, burn)
+    ends = ends_of(solution.vector, linear.residual, windows, inverse)
     scale = np.sqrt(np.diagonal(solution.covariance))
     values, vectors = np.linalg.eigh(solution.covariance / scale[:, None] / scale)
     normal = np.random.default_rng(seed).normal(size=(len(scale), REPLAYS))

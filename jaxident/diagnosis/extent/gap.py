@@ -19,13 +19,10 @@ STEPS = 3
 CHANNELS = ("along", "lateral", "heading")
 
 
-def last_errors(
-    vectors: Array, starts: Array, windows: Windows, law: Law, responses: Responses, burn: int
-) -> np.ndarray:
+def last_errors(vectors: Array, starts: Array, windows: Windows, law: Law, inverse: Array) -> np.ndarray:
     """Pose errors over the camera's deviations (models, windows, 3), along, lateral and in heading, at the last row of
-    windows whose start states are estimated from their first `burn` rows; NaN where that row was not seen.
+    windows whose start states are estimated from their first rows (`early_inverse`); NaN where that row was not seen.
     vectors (models, SIZE), starts (models, 5, windows)."""
-    inverse = early_inverse(law, windows, responses, burn)
     starts = np.stack([settle(*pair, windows, inverse) for pair in zip(vectors, starts, strict=True)])
     residual = follow(vectors, starts, windows)
     seen = np.asarray(windows.seen)[-1]
@@ -77,10 +74,9 @@ class Ends(NamedTuple):
         return columns[:, -3:] - self.early @ columns[:, : self.early.shape[2]]
 
 
-def ends_of(vector: Array, residual: Array, windows: Windows, law: Law, responses: Responses, burn: int) -> Ends:
-    """The linear estimate of start states from their first `burn` rows, about the path of a model (SIZE,) with some
-    residuals (windows, numbers)."""
-    inverse = early_inverse(law, windows, responses, burn)
+def ends_of(vector: Array, residual: Array, windows: Windows, inverse: Array) -> Ends:
+    """The linear estimate of start states from their first rows (`early_inverse`), about the path of a model (SIZE,)
+    with some residuals (windows, numbers)."""
     slope = answer_to_start(np.exp(vector[:2]), residual, windows)
     early = slope[:, : inverse.shape[1]]
     normal = early.transpose(0, 2, 1) @ inverse @ early
@@ -88,10 +84,10 @@ def ends_of(vector: Array, residual: Array, windows: Windows, law: Law, response
 
 
 def early_inverse(law: Law, windows: Windows, responses: Responses, burn: int) -> np.ndarray:
-    """Inverse covariance of the first rows of windows, rows of unseen poses left out."""
-    rows = 3 * burn
-    seen = np.repeat(np.asarray(windows.seen).T, 3, axis=1)[:, :rows]
-    inverse = np.linalg.inv(covariance(law, windows, responses)[:, :rows, :rows])
+    """Inverse covariance (windows, 3 burn, 3 burn) of the first `burn` rows of windows, unseen poses left out."""
+    rows = slice(3 * burn)
+    seen = np.repeat(np.asarray(windows.seen).T, 3, axis=1)[:, rows]
+    inverse = np.linalg.inv(covariance(law, windows, responses, rows))
     return inverse * seen[:, :, None] * seen[:, None, :]
 
 

@@ -8,7 +8,7 @@ from jaxident.diagnosis.causes.search import Solution
 from jaxident.diagnosis.causes.unexplained import UNEXPLAINED
 from jaxident.diagnosis.causes.which import Finding
 from jaxident.diagnosis.extent.floor import Floor, floor_of, wander_of
-from jaxident.diagnosis.extent.gap import deviations, ends_of, last_errors, settle
+from jaxident.diagnosis.extent.gap import deviations, early_inverse, ends_of, last_errors, settle
 from jaxident.diagnosis.extent.shrink import HIGH, LOW, Shrink, shrink_of
 from jaxident.diagnosis.extent.where import Place, increments, locate
 from jaxident.diagnosis.motion.coordinates import COORDINATES, NOMINAL, PLACES, neutral_vector
@@ -48,14 +48,16 @@ def measure(prepared: Prepared, finding: Finding, given, common, seed: int = 0) 
     told = base if given is None else np.concatenate([given, finding.nominal.vector[len(given) :]])
     vectors = np.stack([told, base, best.vector, *(c.solution.vector for c in singles.values())])
     responses, residual, starts = _settled(best.vector, windows, law)
-    found = last_errors(vectors, np.tile(starts, (len(vectors), 1, 1)), windows, law, responses, BURN) ** 2
+    inverse = early_inverse(law, windows, responses, BURN)
+    found = last_errors(vectors, np.tile(starts, (len(vectors), 1, 1)), windows, law, inverse) ** 2
     fitted = respond(np.exp(best.vector[:2]), best.linear.residual, finding.data.windows)
     doubt = doubt_of(law, best.linear.residual, best.linear.starts, finding.data.windows, fitted, finding.data.use)
-    ends = ends_of(best.vector, residual, windows, law, responses, BURN)
+    ends = ends_of(best.vector, residual, windows, inverse)
+    own_inverse = early_inverse(law, finding.data.windows, fitted, BURN)
     replay = floor_of(residual, windows, law, doubt, responses, ends, seed)
 
     def shrink(squares, solution: Solution) -> Shrink:
-        wander = wander_of(solution, finding.data.windows, law, fitted, BURN, seed)
+        wander = wander_of(solution, finding.data.windows, law, own_inverse, seed)
         return shrink_of(found[1], squares, replay, wander, seed)
 
     shrinks = {name: shrink(found[3 + k], c.solution) for k, (name, c) in enumerate(singles.items())}
