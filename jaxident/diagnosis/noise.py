@@ -15,7 +15,8 @@ from jaxident.diagnosis.motion.windows import Windows
 
 MOST_STEPS = 12
 SAMPLE, ROWS = 60, 20
-"""Windows from which noise is sized, spread evenly, and rows of each: slip is slow, and few rows show it."""
+"""Windows from which noise is sized, spread evenly, and rows of each that have a pose: slip is slow, and few rows show
+it."""
 EVERY = slice(None)
 SLIP_TIMES = (0.05, 0.2, 0.8)
 CAMERA_TIMES = (0.1, 0.5)
@@ -57,9 +58,11 @@ def first_law(windows: Windows) -> Law:
     return Law(max(float(np.hypot(found[0], found[1])) / 2.0**0.5, 1e-7), max(found[2], 1e-7))
 
 
-def covariance(law: Law, windows: Windows, responses: Responses, numbers: slice = EVERY) -> np.ndarray:
-    """Covariance (windows, numbers, numbers) of the poses, or of some numbers of each window; unseen ones stand alone
+def covariance(law: Law, windows: Windows, responses: Responses, chosen: slice = EVERY) -> np.ndarray:
+    """Covariance (windows, numbers, numbers) of the poses, or of some numbers of every window; unseen ones stand alone
     with variance 1."""
+    one = np.arange(3 * len(windows.step))[chosen]
+    numbers = np.tile(one, (len(windows.run), 1))
     parts = _parts(law.slip_time, law.coloured_time, windows, responses, numbers)
     variances = [law.position, law.heading, *(law.slip or ()), *(law.coloured or ())]
     total = sum(sd**2 * part for sd, part in zip(variances, parts, strict=True))
@@ -114,14 +117,29 @@ def doubt_of(
 
 
 def _sample(residual: Array, starts: Array, windows: Windows, responses: Responses, use: Array):
-    """Residuals, derivatives by start states, windows, responses and numbers of those that size the noise."""
+    """Residuals, derivatives by start states, windows, responses and numbers (windows, n) of those that size the
+    noise."""
     chosen = np.flatnonzero(use)
     chosen = chosen[np.unique(np.linspace(0, len(chosen) - 1, min(SAMPLE, len(chosen))).round().astype(int))]
     own = take(windows, chosen)
     part = Responses(*(leaf[chosen] for leaf in responses))
-    every = np.arange(0, len(own.seen), max(1, len(own.seen) // ROWS))
-    numbers = (3 * every[:, None] + np.arange(3)).ravel()
-    return residual[chosen][:, numbers], starts[chosen][:, numbers], own, part, numbers
+    length = len(own.seen)
+    rows = _rows_seen(np.asarray(own.seen), len(range(0, length, max(1, length // ROWS))))
+    numbers = (3 * rows[:, :, None] + np.arange(3)).reshape(len(rows), -1)
+    return _at(residual[chosen], numbers), _at(starts[chosen], numbers), own, part, numbers
+
+
+def _rows_seen(seen: Array, count: int) -> np.ndarray:
+    """Rows (windows, count) spread over those that are seen (rows, windows) in each window; where these are too few,
+    all of them and some others."""
+    order = np.argsort(~seen.T, axis=1, kind="stable")
+    found, place = seen.sum(axis=0)[:, None], np.arange(count)
+    return np.sort(np.take_along_axis(order, np.where(found >= count, place * found // count, place), axis=1), axis=1)
+
+
+def _at(values: Array, numbers: Array) -> np.ndarray:
+    """Some numbers (windows, n) of values (windows, numbers, ...)."""
+    return np.take_along_axis(values, numbers.reshape(*numbers.shape, *[1] * (values.ndim - 2)), axis=1)
 
 
 def take(windows: Windows, chosen: Array) -> Windows:
@@ -146,27 +164,23 @@ def _size(given, begin: Law, slip_time: float | None, coloured_time: float | Non
     return Sized(Law(float(sd[0]), float(sd[1]), slip, slip_time, coloured, coloured_time), value)
 
 
-def _parts(slip_time, coloured_time, windows: Windows, responses: Responses, numbers=EVERY) -> list[np.ndarray]:
-    """What each variance multiplies, for some of the numbers."""
-    seen = _numbers_seen(windows)
-    channel, rows = (np.arange(seen.shape[1]) % 3)[numbers], (np.arange(seen.shape[1]) // 3)[numbers]
-    seen = seen[:, numbers]
+def _parts(slip_time, coloured_time, windows: Windows, responses: Responses, numbers: Array) -> list[np.ndarray]:
+    """What each variance multiplies (windows, n, n), for some numbers (windows, n)."""
+    seen = _at(_numbers_seen(windows), numbers)
     both = seen[:, :, None] * seen[:, None, :]
-    camera = [np.eye(len(channel)) * wanted for wanted in (channel < 2, channel == 2)]
-    parts = [both * part for part in camera]
+    of_position, of_heading = (numbers % 3 < 2)[:, None], (numbers % 3 == 2)[:, None]
+    parts = [both * np.eye(numbers.shape[1]) * wanted for wanted in (of_position, of_heading)]
     step = np.asarray(windows.step).T
     time = np.cumsum(step, axis=1) - step
-    apart = np.abs(time[:, :, None] - time[:, None, :])
     if slip_time is not None:
-        memory = np.exp(-apart / slip_time)
-        parts += [
-            both * (g @ memory @ g.transpose(0, 2, 1))
-            for g in (responses.along[:, numbers], responses.heading[:, numbers])
-        ]
+        memory = np.exp(-np.abs(time[:, :, None] - time[:, None, :]) / slip_time)
+        answers = (_at(g, numbers) for g in (responses.along, responses.heading))
+        parts += [both * (g @ memory @ g.transpose(0, 2, 1)) for g in answers]
     if coloured_time is not None:
-        memory = np.exp(-apart / coloured_time)[:, rows][:, :, rows]
-        same = channel[:, None] == channel
-        parts += [both * memory * (same & (channel < 2)), both * memory * (same & (channel == 2))]
+        own = _at(time, numbers // 3)
+        memory = np.exp(-np.abs(own[:, :, None] - own[:, None, :]) / coloured_time)
+        same = (numbers % 3)[:, :, None] == (numbers % 3)[:, None]
+        parts += [both * memory * (same & wanted) for wanted in (of_position, of_heading)]
     return parts
 
 
@@ -175,9 +189,9 @@ def _numbers_seen(windows: Windows) -> np.ndarray:
     return np.repeat(np.asarray(windows.seen).T, 3, axis=1).astype(float)
 
 
-def _alone(windows: Windows, numbers=EVERY) -> np.ndarray:
-    """Variance 1 for numbers that were not seen."""
-    unseen = 1.0 - _numbers_seen(windows)[:, numbers]
+def _alone(windows: Windows, numbers: Array) -> np.ndarray:
+    """Variance 1 for those of some numbers (windows, n) that were not seen."""
+    unseen = 1.0 - _at(_numbers_seen(windows), numbers)
     return unseen[:, :, None] * np.eye(unseen.shape[1])
 
 
@@ -208,6 +222,7 @@ def _likelihood(residual: Array, starts: Array, parts, theta: Array, alone: Arra
     weighted = inverse @ starts
     information = starts.transpose(0, 2, 1) @ weighted
     scale = np.sqrt(np.diagonal(information, axis1=1, axis2=2))[:, :, None]
+    scale = np.where(scale > 0.0, scale, 1.0)  # a window without any pose among these numbers
     information = information / scale / scale.transpose(0, 2, 1) + 1e-12 * np.eye(5)
     weighted = weighted / scale.transpose(0, 2, 1)
     inverse = inverse - weighted @ np.linalg.solve(information, weighted.transpose(0, 2, 1))

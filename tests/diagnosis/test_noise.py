@@ -48,6 +48,20 @@ def test_white_noise_stays_white(made):
     assert found.heading == pytest.approx(law.heading, rel=0.1)
 
 
+def test_noise_is_sized_where_poses_come_every_other_row(made):
+    """The rows that fewer are sized from must be those with a pose, whatever the rhythm; one window has none at all."""
+    windows, responses, starts = made
+    windows = windows._replace(seen=windows.seen & (np.arange(ROWS) % 2 == 1)[:, None] & (np.arange(COUNT) > 0))
+    law, mask = Law(5e-4, 4e-3), np.repeat(windows.seen.T, 3, axis=1)
+    noise = np.random.default_rng(5).normal(size=(COUNT, ROWS, 3)) * [law.position, law.position, law.heading]
+    found = size_noise(
+        noise.reshape(COUNT, -1) * mask, starts * mask[:, :, None], windows, responses, np.ones(COUNT, bool)
+    )
+    assert found.slip is None
+    assert found.position == pytest.approx(law.position, rel=0.08)
+    assert found.heading == pytest.approx(law.heading, rel=0.1)
+
+
 def test_slip_is_found_and_sized(made):
     law = Law(5e-4, 4e-3, (0.03, 0.4), 0.2)
     found = sized(law, made, 3)
