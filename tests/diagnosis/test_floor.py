@@ -34,6 +34,16 @@ def test_a_camera_alone_leaves_its_own_variance_and_that_of_the_start():
     assert 1.0 < floor(Law(5e-4, 4e-3), ROWS).value < 30.0
 
 
+def test_a_window_without_poses_to_start_from_stays_finite():
+    windows, nothing, law = along_arcs(ROWS, COUNT), np.zeros((COUNT, 3 * ROWS)), Law(5e-4, 4e-3)
+    windows = windows._replace(seen=windows.seen & ((np.arange(ROWS) >= BURN)[:, None] | (np.arange(COUNT) > 0)))
+    inverse = early_inverse(law, windows, respond(np.exp(VECTOR), nothing, windows), BURN)
+    early = ends_of(VECTOR, nothing, windows, inverse).early
+    assert np.all(early[0] == 0.0)
+    assert np.all(np.isfinite(early))
+    assert np.all(np.any(early[1:] != 0.0, axis=(1, 2)))
+
+
 def test_windows_in_common_tell_less():
     """Twelve times the same rows on other arcs, or twelve stretches of their own: sampled more widely, seen by slip."""
     apart, together = (np.std(floor(SLIPPING, stride).replays) for stride in (ROWS, 1))

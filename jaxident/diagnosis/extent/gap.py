@@ -109,4 +109,5 @@ def deviations(law: Law) -> np.ndarray:
 
 
 def _scale(normal: Array) -> np.ndarray:
-    return np.eye(5) * np.max(np.diagonal(normal, axis1=1, axis2=2), axis=1)[:, None, None]
+    largest = np.max(np.diagonal(normal, axis1=1, axis2=2), axis=1)[:, None, None]
+    return np.eye(5) * np.where(largest > 0.0, largest, 1.0)  # a window without poses in its first rows

@@ -17,7 +17,11 @@ from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.motion.windows import Windows, cut
 from jaxident.diagnosis.noise import Law, doubt_of, white_whitener
 from jaxident.diagnosis.prepare import BURN, Prepared, first_starts
+from jaxident.errors import InputError
 from jaxident.log import Log
+
+FEWEST = 3
+"""Poses among the first rows of a window that judges: five numbers of its start state are estimated from them."""
 
 
 class Gap(NamedTuple):
@@ -100,15 +104,17 @@ def _with(finding: Finding, common: tuple[str, ...]) -> Solution:
 
 
 def judging_windows(prepared: Prepared, rows: int) -> Windows:
-    """Windows of the runs that judge, overlapping by two thirds; of one or two runs, those that do not name."""
+    """Windows of the runs that judge, overlapping by two thirds; of one or two runs, those that do not name. Without
+    poses to start from a window does not judge. InputError where none is left."""
     windows = prepared.windows
     own = ~prepared.naming
-    if len(np.unique(windows.run)) < 3:
-        chosen = np.flatnonzero(own)
-        return pick(windows, chosen, len(own))
-    dense = cut(blinded(prepared), rows, stride=max(rows // 3, 1), session=windows.session)
-    chosen = np.flatnonzero(dense.run % 3 == 1)
-    return pick(dense, chosen, len(own))
+    if len(np.unique(windows.run)) >= 3:
+        windows = cut(blinded(prepared), rows, stride=max(rows // 3, 1), session=windows.session)
+        own = windows.run % 3 == 1
+    chosen = np.flatnonzero(own & (np.sum(windows.seen[:BURN], axis=0) >= FEWEST))
+    if not chosen.size:
+        raise InputError(f"no stretch of the runs kept for judging has {FEWEST} poses in its first {BURN} rows")
+    return pick(windows, chosen, len(prepared.naming))
 
 
 def blinded(prepared: Prepared) -> Log:
