@@ -75,6 +75,14 @@ def test_regions_are_in_the_users_unit():
     assert [row[0] for row in sites.rows] == list(SITES)
 
 
+def test_what_the_effects_move_is_told_beside_what_the_nominal_model_misses():
+    told = plain_spaces(section(diagnosis_page(made_up("effects"), "runs"), "Where it lies").blocks[0])
+    assert "parameters refitted, 55 % is in the direction of travel" in told
+    assert told.endswith("all else alike, 70 % is in the direction of travel, 0 % is sideways, 30 % is in heading.")
+    unknown = section(diagnosis_page(made_up("unknown"), "runs"), "Where it lies").blocks[0]
+    assert "all else alike" not in unknown
+
+
 def test_models_that_were_not_given_are_not_shown():
     (alone,) = tables(section(diagnosis_page(made_up("effects"), "runs"), "How large the gap is"))
     (beside,) = tables(section(diagnosis_page(made_up("effects", given=True), "runs"), "How large the gap is"))

@@ -95,8 +95,11 @@ def _place(gap: bool) -> Place:
     size = 40.0 if gap else 0.1
     table = {n: (e, size * np.linspace(-0.1, 1.0 + 0.1 * k, len(e) - 1) ** 3) for k, (n, e) in enumerate(edges.items())}
     regions = [Region("u_r", 0.5, 1.0, 0.6, 0.001), Region("|v|", 0.3, 0.9, 0.4, 0.01)] if gap else []
-    channels = dict(zip(("along", "lateral", "heading"), (0.55, 0.05, 0.4) if gap else (0.0, 0.0, 0.0), strict=True))
-    return Place(channels, regions, table)
+    moved, excess = (
+        dict(zip(("along", "lateral", "heading"), shares if gap else (0.0, 0.0, 0.0), strict=True))
+        for shares in ((0.7, 0.0, 0.3), (0.55, 0.05, 0.4))
+    )
+    return Place(moved, excess, regions, table)
 
 
 def _finding(selected: tuple[str, ...], gap: bool, verdict: str) -> Finding:
