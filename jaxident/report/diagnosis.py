@@ -158,16 +158,15 @@ GAP_CAPTION = (
 
 def _where(found: Diagnosis) -> Section:
     """Channels, the map, the regions that stand out, and the sites."""
-    place, largest, channels = found.where, found.prepared.largest, words.CHANNELS
+    place, largest = found.where, found.prepared.largest
     beyond = any(share > 0.0 for share in place.excess.values())
     if beyond:
-        shares = ", ".join(f"{percent(share)} is {channels[name]}" for name, share in place.excess.items())
-        text = f"Of the nominal model's error beyond the floor, parameters refitted, {shares}."
+        text = f"Of the nominal model's error beyond the floor, parameters refitted, {_shares(place.excess)}."
     else:
         text = "The nominal model's error does not lie above the floor in any channel."
-    if found.selected and place.channels != place.excess:
-        shares = ", ".join(f"{percent(share)} is {channels[name]}" for name, share in place.channels.items())
-        text += f" Of what {together(found.selected)} adds to the poses, all else alike, {shares}."
+    moving = [name for name in found.selected if name in found.finding.selected]
+    if moving and place.channels != place.excess:
+        text += f" Of the movement due to {together(moving)}, all else alike, {_shares(place.channels)}."
     blocks: list = [text]
     if place.table and beyond:
         blocks += [MAP, _map(found)]
@@ -183,6 +182,10 @@ def _where(found: Diagnosis) -> Section:
     sites = [(site, SITES[site], chance(p)) for site, p in found.judgement.sites.items()]
     blocks.append(Table(("site", "what it is", "takes part"), sites, "Where in the robot the cause lies."))
     return Section("Where it lies", blocks)
+
+
+def _shares(channels: dict[str, float]) -> str:
+    return ", ".join(f"{percent(share)} is {words.CHANNELS[name]}" for name, share in channels.items())
 
 
 MAP = (

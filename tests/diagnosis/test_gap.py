@@ -6,8 +6,12 @@ from support.arcs import along_arcs
 
 from jaxident.diagnosis.extent import gap
 from jaxident.diagnosis.extent.floor import Floor
+from jaxident.diagnosis.extent.measure import FEWEST, judging_windows
 from jaxident.diagnosis.extent.shrink import interval, shrink_of
 from jaxident.diagnosis.extent.where import Region, _discoveries, _regions, increments
+from jaxident.diagnosis.motion.responses import modelled_path
+from jaxident.diagnosis.prepare import BURN, Prepared
+from jaxident.errors import InputError
 
 COUNT = 90
 NOTHING = np.zeros(400)
@@ -131,11 +135,34 @@ def test_adjusted_probabilities_are_those_of_benjamini_and_hochberg():
     assert sorted(round(region.p_value, 6) for region in _discoveries(given)) == [0.004, 0.04]
 
 
+def prepared(windows):
+    """One run whose first half of windows names; what judging does not read is left out."""
+    naming = np.arange(len(windows.run)) < len(windows.run) // 2
+    return Prepared(None, 1.0, windows, naming, 1.0, None, None, None)
+
+
+def test_windows_without_early_poses_do_not_judge():
+    windows = along_arcs(40, 6)
+    windows.seen[: BURN - FEWEST + 1, 4] = False  # one pose short
+    windows.seen[: BURN - FEWEST, 5] = False
+    judging = judging_windows(prepared(windows), 40)
+    assert len(judging.run) == 6  # filled up for the program that is compiled already
+    np.testing.assert_array_equal(judging.first[:2], windows.first[[3, 5]])
+    assert not judging.seen[2:, 2:].any()
+
+
+def test_a_log_without_early_poses_to_judge_by_is_refused():
+    windows = along_arcs(40, 4)
+    windows.seen[:BURN, 2:] = False
+    with pytest.raises(InputError, match="no stretch of the runs kept for judging"):
+        judging_windows(prepared(windows), 40)
+
+
 def test_a_turned_marker_looks_like_sideways_movement():
     windows, turned = along_arcs(40, 3, 40), np.zeros((3, 40, 3))
     turned[..., 2] = -0.1
-    along, lateral, heading = increments(np.zeros((3, 120)), windows)
-    seen = increments(turned.reshape(3, -1), windows)
+    along, lateral, heading = increments(modelled_path(np.zeros((3, 120)), windows))
+    seen = increments(modelled_path(turned.reshape(3, -1), windows))
     np.testing.assert_allclose(seen[0], along * np.cos(0.1) + lateral * np.sin(0.1), atol=1e-12)
     np.testing.assert_allclose(seen[1], lateral * np.cos(0.1) - along * np.sin(0.1), atol=1e-12)
     np.testing.assert_allclose(seen[2], heading, atol=1e-12)

@@ -13,7 +13,7 @@ from jaxident.diagnosis.extent.shrink import HIGH, LOW, Shrink, shrink_of
 from jaxident.diagnosis.extent.where import Place, increments, locate
 from jaxident.diagnosis.motion.coordinates import COORDINATES, NOMINAL, PLACES, neutral_vector
 from jaxident.diagnosis.motion.linear import follow
-from jaxident.diagnosis.motion.responses import respond
+from jaxident.diagnosis.motion.responses import modelled_path, respond
 from jaxident.diagnosis.motion.windows import Windows, cut
 from jaxident.diagnosis.noise import Law, doubt_of, white_whitener
 from jaxident.diagnosis.prepare import BURN, Prepared, first_starts
@@ -92,7 +92,7 @@ def moved_by(finding: Finding, common: tuple[str, ...], starts, windows: Windows
     without = np.array(best)
     without[places] = neutral_vector(best[: len(NOMINAL)])[places]
     both = follow(np.stack([best, without]), np.stack([starts, starts]), windows)
-    added = np.subtract(*(increments(residual, windows) for residual in both))
+    added = np.subtract(*(increments(modelled_path(residual, windows)) for residual in both))
     return np.sum(added**2, axis=2).T / deviations(law) ** 2
 
 

@@ -59,21 +59,21 @@ def _shares(squares: Array) -> dict[str, float]:
     return dict(zip(CHANNELS, share.tolist(), strict=True))
 
 
-def increments(residual: Array, windows: Windows) -> np.ndarray:
-    """Modelled movement along, sideways and in heading (3, windows, rows - 1) from row to row, as the robot's own
-    heading half-way sees it."""
-    dx, dy, turned = (np.diff(column, axis=1) for column in modelled_path(residual, windows))
-    direction = modelled_path(residual, windows)[2][:, :-1] + 0.5 * turned
+def increments(path: tuple[Array, Array, Array]) -> np.ndarray:
+    """Movement of a path (three of (windows, rows)) along, sideways and in heading (3, windows, rows - 1) from row to
+    row, as the robot's own heading half-way sees it."""
+    dx, dy, turned = (np.diff(column, axis=1) for column in path)
+    direction = path[2][:, :-1] + 0.5 * turned
     sine, cosine = np.sin(direction), np.cos(direction)
     return np.stack([cosine * dx + sine * dy, -sine * dx + cosine * dy, turned])
 
 
 def describe(residual: Array, windows: Windows) -> dict[str, np.ndarray]:
     """What the robot did in each window (windows,): levels, speeds, reversals, rest, heading, position, time."""
-    x, y, theta = modelled_path(residual, windows)
+    x, y, theta = path = modelled_path(residual, windows)
     step = np.asarray(windows.step).T
     rows = np.arange(step.shape[1])
-    along, _, turned = increments(residual, windows)
+    along, _, turned = increments(path)
     v, w = along / step[:, :-1], turned / step[:, :-1]
     places = np.minimum(windows.first + rows[:, None], len(windows.command) - 1)
     u = np.asarray(windows.command)[places, windows.run]
