@@ -1,6 +1,6 @@
 """Do bootstrap intervals cover where the noise law is wrong?
 
-    python experiments/bootstrap_coverage.py --seeds 100 --count 100
+    python -m experiments.bootstrap_coverage --seeds 100 --count 100
 
 A robot of 1000 rows at 1 mm / 10 mrad on multilevel inputs, the noise white or not, always fitted as white. Does the
 95 % interval of each of eight parameters hold the truth? The likelihood's own, and the bootstrap's from blocks of
@@ -9,6 +9,7 @@ parameters of one seed err together.
 """
 
 import argparse
+import dataclasses
 import functools
 
 import jax
@@ -16,6 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 
 import jaxident as ji
+from experiments.diagonal import PERIOD, ROBOT, TRUTH
 from jaxident.array_types import AT_REST, Pose, Wheels
 from jaxident.estimation.blocks import block_length
 from jaxident.estimation.bootstrap import PILOTS, enlargement, refit, summarise
@@ -23,14 +25,11 @@ from jaxident.estimation.maximum_likelihood import fit_runs
 from jaxident.estimation.parameters import Law, names
 from jaxident.estimation.precision import natural_values
 from jaxident.estimation.runs import Runs
-from jaxident.robot.drive import Physical
 from jaxident.robot.excitation import EXCITATIONS
-from jaxident.robot.model import Model
 from jaxident.robot.noise import Noise, draw_noise, observe
 from jaxident.robot.simulate import run_physical
 
-PERIOD, D_MAX = 1.0 / 30.0, 0.9
-TRUTH = np.array([0.541386, 7.817043, 0.128988, 0.127287, 66.824208, -65.25288, 0.25, 0.2])
+D_MAX = 0.9
 NOISES = {
     "white": Noise(1e-3, 1e-2),
     "ar0.7": Noise(1e-3, 1e-2, -PERIOD / np.log(0.7)),
@@ -47,7 +46,7 @@ def record(key, noise, rows, runs):
     def one(key):
         key, own = jax.random.split(key)
         command, unit = EXCITATIONS["multilevel"](key, rows), draw_noise(own, rows)
-        model = Model(PERIOD, Physical(TRUTH[:2], TRUTH[2:6].reshape(2, 2)), TRUTH[6:], noise)
+        model = dataclasses.replace(ROBOT, noise=noise)
         state = run_physical(model, command, jnp.asarray(PERIOD), AT_REST, unit)
         return command, observe(state.pose, noise, unit, jnp.asarray(PERIOD))
 

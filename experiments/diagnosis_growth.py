@@ -1,6 +1,6 @@
 """How the time of a diagnosis grows with runs and their length.
 
-    python experiments/diagnosis_growth.py [--out diagnosis_growth.csv]
+    python -m experiments.diagnosis_growth [--out diagnosis_growth.csv]
 
 The published robot without coupling and with `turn_loss`, multilevel inputs at 1/30 s, camera noise of 0.5 mm and
 5 mrad. Every size is diagnosed twice: the first time compiles for its shapes. Seconds of the wall clock and of the
@@ -9,6 +9,7 @@ processor; compare rows of one run.
 
 import argparse
 import csv
+import dataclasses
 import pathlib
 import time
 
@@ -16,17 +17,12 @@ import jax
 import numpy as np
 
 import jaxident as ji
+from experiments.diagonal import PERIOD, ROBOT
 from jaxident.log import Log, join
-from jaxident.robot.drive import Physical
-from jaxident.robot.model import Effect, Model
+from jaxident.robot.model import Effect
 from jaxident.study.synthetic import excite, simulate_runs
 
-ROBOT = Model(
-    1.0 / 30.0,
-    Physical(np.array([0.541386, 7.817043]), np.array([[0.128988, 0.127287], [66.824208, -65.25288]])),
-    np.array([0.25, 0.2]),
-    effects=(Effect("turn_loss", {"loss": 0.1}),),
-)
+LOSING = dataclasses.replace(ROBOT, effects=(Effect("turn_loss", {"loss": 0.1}),))
 SIZES = ((3, 1000), (6, 1000), (12, 1000), (24, 1000), (6, 500), (6, 2000), (6, 4000))
 
 
@@ -34,9 +30,9 @@ def record(runs: int, samples: int) -> list[Log]:
     """Noisy runs of the robot."""
     parts = []
     for number in range(runs):
-        log = excite(jax.random.key(number), "multilevel", samples, ROBOT.sample_period)
+        log = excite(jax.random.key(number), "multilevel", samples, PERIOD)
         parts.append(log._replace(run=np.full(samples, number)))
-    found = simulate_runs(ROBOT, join(parts), noise=(5e-4, 5e-3), key=jax.random.key(99))
+    found = simulate_runs(LOSING, join(parts), noise=(5e-4, 5e-3), key=jax.random.key(99))
     return found.runs()
 
 

@@ -1,6 +1,6 @@
 """How does each effect of the catalogue show?
 
-    python experiments/effects_sheet.py --out effects_sheet
+    python -m experiments.effects_sheet --out effects_sheet
 
 The published robot at each effect's typical size and the nominal one under the same commands: what a tenth of a second
 takes the one further than the other, each in the frame of its own pose at the start, against command, speed, heading,

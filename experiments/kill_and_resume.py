@@ -1,6 +1,6 @@
 """Does a study that is killed at any moment end with the same arrays?
 
-    python experiments/kill_and_resume.py [--kills 20]
+    python -m experiments.kill_and_resume [--kills 20]
 
 Runs a small study once without interruption, then again and again in fresh folders, each time ended by SIGKILL at a
 random moment and resumed by the same command. Counts the stores whose arrays equal the first one's, bit for bit.

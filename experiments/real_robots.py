@@ -1,6 +1,6 @@
 """How far ahead does the paper's model see on real robots?
 
-    python experiments/real_robots.py --data ../shared/data --out real_robots [--robots 1 2]
+    python -m experiments.real_robots --data ../shared/data --out real_robots [--robots 1 2]
 
 Five iRobot Create robots (UTIAS MRCLAM dataset 6, Leung et al. 2011; motion capture): identified on the first half of
 each log, predicted 10 s ahead on the second. A Husky (norlab-ulaval DRIVE; lidar): identified on 400 of its windows,

@@ -1,6 +1,6 @@
 """Which recursive estimator stands the camera?
 
-    python experiments/recursive_estimators.py --trials 100 --out recursive_estimators
+    python -m experiments.recursive_estimators --trials 100 --out recursive_estimators
 
 Three of them on the same runs of 1000 rows of the paper's robot, all begun on the first 200: the joint Kalman filter,
 the paper's recursive least squares, and recursive instrumental variables (Soederstroem and Stoica 1983), whose
@@ -19,6 +19,7 @@ import jax.numpy as jnp
 import numpy as np
 
 import jaxident as ji
+from experiments.diagonal import DRIVE, PERIOD, TRUTH
 from jaxident.array_types import AT_REST, Wheels
 from jaxident.estimation import joint_filter, recursive
 from jaxident.estimation.initialise import initialise
@@ -36,8 +37,7 @@ from jaxident.robot.model import DIFFERENCE_ORDER, difference_vector
 from jaxident.robot.noise import Noise, draw_noise, observe
 from jaxident.robot.simulate import run_forces
 
-PERIOD, ROWS, SETUP, D_MAX = 1.0 / 30.0, 1000, 200, 0.9
-TRUTH = jnp.array([0.541386, 7.817043, 0.128988, 0.127287, 66.824208, -65.25288, 0.25, 0.2])
+ROWS, SETUP, D_MAX = 1000, 200, 0.9
 FALL = 0.2
 ESTIMATORS = ("joint filter", "recursive least squares", "instrumental variables")
 FALLING = {"rate": (1, "alpha_2"), "gain": (5, "delta_22"), "dead zone": (6, "dead_zone_r")}
@@ -137,7 +137,7 @@ def at_the_end(key, excitation, noise):
     ends = [joint(command, pose, jnp.inf)[1][-1]]
     ends += [method(command, pose, 1.0)[-1] for method in (least_squares, instrumental)]
     runs = Runs(jnp.asarray(PERIOD), *jax.tree.map(lambda c: c[None], (command, pose)), jnp.ones((1, ROWS), bool))
-    vector = to_vector(Robot(Physical(TRUTH[:2], TRUTH[2:6].reshape(2, 2)), TRUTH[6:], noise), Law())
+    vector = to_vector(Robot(DRIVE, TRUTH[6:], noise), Law())
     bound = difference_covariance(vector, bound_covariance(vector, jnp.zeros(5), runs, Law()), PERIOD, Law())
     return (jnp.stack(ends) - image(TRUTH)) / jnp.sqrt(jnp.diagonal(bound))
 

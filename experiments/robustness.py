@@ -1,6 +1,6 @@
 """Which effects spoil which parameter, for the paper's method and for maximum likelihood?
 
-    python experiments/robustness.py --out robustness [--seeds 200]
+    python -m experiments.robustness --out robustness [--seeds 200]
 
 The published robot without coupling, each effect of the catalogue alone at three strengths (in typical sizes), the
 same seeds for all. Both estimators know of no effect: what their estimates are off by is the effect's doing, but for

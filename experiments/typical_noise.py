@@ -1,6 +1,6 @@
 """Which camera noise makes the paper's printed errors a typical draw of its own method?
 
-    python experiments/typical_noise.py --out typical_noise
+    python -m experiments.typical_noise --out typical_noise
 
 At each level of experiments/typical_noise.toml a trial's size of error is the geometric mean of its relative errors
 over a set of parameters, which gives a dead zone and a numerator the same say. The paper's one draw is as large as that

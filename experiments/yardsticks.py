@@ -1,6 +1,6 @@
 """How far do classical estimators of the difference equations come beside maximum likelihood?
 
-    python experiments/yardsticks.py --seeds 100 --out yardsticks.csv
+    python -m experiments.yardsticks --seeds 100 --out yardsticks.csv
 
 The robot without coupling, multilevel inputs of 1000 rows at 1/30 s, camera noise from 0.2 to 5 mm with 10 mrad
 for each mm, the same draws for every estimator. Relative root-mean-square errors with standard errors over seeds, and
@@ -15,17 +15,12 @@ import pathlib
 import numpy as np
 
 import jaxident as ji
-from jaxident.robot.drive import Physical
-from jaxident.robot.model import DIFFERENCE_ORDER, Model
+from experiments.diagonal import ROBOT
+from jaxident.robot.model import DIFFERENCE_ORDER
 from jaxident.study.dataset import study_arrays
 from jaxident.study.design import Candidate, Study
 from jaxident.study.estimators import FOUND, Choice
 
-ROBOT = Model(
-    1.0 / 30.0,
-    Physical(np.array([0.541386, 7.817043]), np.array([[0.128988, 0.127287], [66.824208, -65.25288]])),
-    np.array([0.25, 0.2]),
-)
 ESTIMATORS = ("recursive", "key-term-least-squares", "instrumental-variables", "maximum-likelihood")
 NOISE = (2e-4, 5e-4, 1e-3, 2e-3, 5e-3)
 GROUPS = {

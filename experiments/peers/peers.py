@@ -1,7 +1,7 @@
 """Other people's tools on the records that `compare.py draw` wrote.
 
     python3 -m venv peers_env && peers_env/bin/pip install -r experiments/peers/requirements.txt
-    peers_env/bin/python experiments/peers/peers.py --data peers/data.npz --out peers/theirs.npz
+    peers_env/bin/python -m experiments.peers.peers --data peers/data.npz --out peers/theirs.npz
 
 Unknown are two rates, four gains and two dead zones; wherever a tool allows it, the five start states too. What a tool
 lacks it is given: the simulator below, the camera's noise, and a start about half off: each number times exp(z / 2), z
