@@ -81,13 +81,13 @@ def _at(robot: Model, setup: Observations) -> recursive.Estimate:
     return recursive.start(robot.difference, jnp.asarray(robot.dead_zone), setup, D_MAX, 1.0)
 
 
-def trial(robot: Model, key: Array) -> tuple[Array, Array]:
+def trial(robot: Model, key: Array, samples: int = TRIAL_SAMPLES) -> tuple[Array, Array]:
     """One whole trial: own excitation, simulation, camera noise, start values, recursion. Estimate (12,), and ok."""
     key_input, key_noise = jax.random.split(key)
     period = jnp.asarray(robot.sample_period)
-    command = multilevel(key_input, TRIAL_SAMPLES)
+    command = multilevel(key_input, samples)
     pose = run_physical(robot, command, period, AT_REST).pose
-    pose = observe(pose, CAMERA, draw_noise(key_noise, TRIAL_SAMPLES), period)
+    pose = observe(pose, CAMERA, draw_noise(key_noise, samples), period)
     setup = start_values(command, pose, period)
     observations = complete_observations(command, path_length(pose))
     early = jax.tree.map(lambda column: column[: SETUP_ROWS - 2], observations)
