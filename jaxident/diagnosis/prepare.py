@@ -13,7 +13,8 @@ from jaxident.diagnosis.motion.coordinates import neutral_vector, nominal_vector
 from jaxident.diagnosis.motion.linear import START_STATES
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.motion.windows import Windows, cut
-from jaxident.diagnosis.noise import Law, first_law, size_noise, white_whitener
+from jaxident.diagnosis.noise.law import Law, first_law, white_whitener
+from jaxident.diagnosis.noise.sizing import size_noise
 from jaxident.errors import InputError
 from jaxident.estimation.checks import check_informative
 from jaxident.estimation.maximum_likelihood import begin

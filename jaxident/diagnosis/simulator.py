@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.diagnosis.causes.which import Finding, search_effects
-from jaxident.diagnosis.noise import Law
+from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.prepare import Prepared, prepare
 from jaxident.diagnosis.translate import to_coordinates
 from jaxident.effects.checks import check_effects

@@ -18,7 +18,7 @@ from jaxident.diagnosis.motion.coordinates import (
     to_catalogue,
     unit_factors,
 )
-from jaxident.diagnosis.noise import Law
+from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.prepare import Prepared
 from jaxident.effects.catalogue import by_name, to_vector
 from jaxident.log import Log, join

@@ -14,7 +14,7 @@ from jaxident.diagnosis.motion.coordinates import COORDINATES, PLACES, neutral_v
 from jaxident.diagnosis.motion.linear import explained, follow, gram
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.motion.windows import cut
-from jaxident.diagnosis.noise import Law, white_whitener
+from jaxident.diagnosis.noise.law import Law, white_whitener
 from jaxident.diagnosis.prepare import find_more_outliers, find_outliers
 from jaxident.diagnosis.replay import Answers, answers, replay, visible
 from jaxident.effects.catalogue import CATALOGUE

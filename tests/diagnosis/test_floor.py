@@ -7,7 +7,8 @@ from support.arcs import along_arcs
 from jaxident.diagnosis.extent.floor import REPLAYS, floor_of
 from jaxident.diagnosis.extent.gap import early_inverse, ends_of
 from jaxident.diagnosis.motion.responses import respond
-from jaxident.diagnosis.noise import Law
+from jaxident.diagnosis.noise.doubt import Draws
+from jaxident.diagnosis.noise.law import Law, variances_of
 
 ROWS, COUNT, BURN = 40, 12, 10
 VECTOR = np.log([4.0, 5.0])
@@ -15,12 +16,19 @@ SLIPPING = Law(5e-4, 4e-3, (0.03, 0.4), 0.2)
 REMEMBERING = Law(5e-4, 4e-3, coloured=(1e-3, 5e-3), coloured_time=0.3)
 
 
-def floor(law, stride, doubt=0.0):
+def draws(law, doubt, times=(0.2,)):
+    """As many as replays, in turns of these memories, the variances of doubtful size."""
+    sizes = np.sqrt(variances_of(law))[:, None]
+    unit = np.random.default_rng(7).normal(size=(len(sizes), REPLAYS))
+    slip_time = None if law.slip is None else np.resize(times, REPLAYS)
+    return Draws(sizes * np.exp(0.5 * np.sqrt(doubt) * unit), slip_time, law.coloured_time)
+
+
+def floor(law, stride, doubt=0.0, times=(0.2,)):
     windows, nothing = along_arcs(ROWS, COUNT, stride), np.zeros((COUNT, 3 * ROWS))
     responses = respond(np.exp(VECTOR), nothing, windows)
     ends = ends_of(VECTOR, nothing, windows, early_inverse(law, windows, responses, BURN))
-    variances = 2 + 2 * (law.slip is not None) + 2 * (law.coloured is not None)
-    return floor_of(nothing, windows, law, doubt * np.eye(variances), responses, ends)
+    return floor_of(nothing, windows, law, draws(law, doubt, times), responses, ends)
 
 
 @pytest.mark.parametrize("law", [Law(5e-4, 4e-3), SLIPPING, REMEMBERING])
@@ -53,3 +61,10 @@ def test_windows_in_common_tell_less():
 def test_a_doubtful_law_widens_the_floor():
     sure, doubtful = (np.std(floor(SLIPPING, ROWS, doubt).replays) for doubt in (0.0, 0.5))
     assert doubtful > 1.3 * sure
+
+
+def test_slip_of_longer_memory_leaves_more_at_the_end_of_a_window():
+    short, long, either = (floor(SLIPPING, ROWS, 0.0, times).replays for times in ((0.2,), (0.4,), (0.2, 0.4)))
+    assert np.mean(long) > 1.2 * np.mean(short)
+    assert np.mean(either) == pytest.approx(0.5 * (np.mean(short) + np.mean(long)), rel=0.1)
+    assert np.std(either) > np.std(short)

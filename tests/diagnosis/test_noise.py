@@ -5,7 +5,9 @@ import pytest
 from support.arcs import along_arcs
 
 from jaxident.diagnosis.motion.responses import answer_to_start, respond
-from jaxident.diagnosis.noise import Law, _sample, _size, covariance, doubt_of, first_law, size_noise, whitener_of
+from jaxident.diagnosis.noise.doubt import MEMORIES, doubt_of, draw_laws, sizes_by_memory
+from jaxident.diagnosis.noise.law import Law, covariance, first_law, whitener_of
+from jaxident.diagnosis.noise.sizing import sample, size_noise, size_one
 
 ROWS, COUNT = 45, 60
 RATES = np.array([4.0, 5.0])
@@ -86,11 +88,36 @@ def test_doubt_is_the_spread_of_the_sizes(made):
     apart = []
     for seed in range(24):
         residual = (factor @ np.random.default_rng(seed).normal(size=(COUNT, 3 * ROWS, 1)))[..., 0]
-        found = _size(_sample(residual, starts, windows, responses, use), law, 0.2, None).law
-        doubt = doubt_of(found, residual, starts, windows, responses, use)
+        given = sample(residual, starts, windows, responses, use)
+        found = size_one(given, law, 0.2, None).law
+        doubt = doubt_of(found, given)
         sizes = [np.log(np.square([one.position, one.heading, *one.slip])) for one in (found, law)]
         apart.append((sizes[0] - sizes[1]) / np.sqrt(np.diagonal(doubt)))
     assert 0.75 < np.sqrt(np.mean(np.square(apart))) < 1.25
+
+
+def test_drawn_memories_hold_the_true_one(made):
+    """Slip remembers 0.3 s: draws lie about it and those far away are rare; deviations as they were."""
+    windows, responses, starts = made
+    law, use = Law(5e-4, 4e-3, (0.06, 0.8), 0.3), np.ones(COUNT, bool)
+    factor = np.linalg.cholesky(covariance(law, windows, responses))
+    residual = (factor @ np.random.default_rng(11).normal(size=(COUNT, 3 * ROWS, 1)))[..., 0]
+    given = sample(residual, starts, windows, responses, use)
+    sizes = sizes_by_memory(law, given)
+    assert [sized.law.slip_time for sized in sizes] == list(MEMORIES)
+    draws = draw_laws(sizes, given, 400, seed=1)
+    assert draws.deviations.shape == (4, 400)
+    assert np.quantile(draws.slip_time, 0.05) <= 0.3 <= np.quantile(draws.slip_time, 0.95)
+    assert np.mean((draws.slip_time > 0.1) & (draws.slip_time < 0.9)) > 0.95
+    np.testing.assert_allclose(np.median(draws.deviations, axis=1), [5e-4, 4e-3, 0.06, 0.8], rtol=0.35)
+
+
+def test_a_law_without_slip_has_no_memory_to_draw(made):
+    windows, responses, starts = made
+    given = sample(np.zeros((COUNT, 3 * ROWS)), starts, windows, responses, np.ones(COUNT, bool))
+    draws = draw_laws(sizes_by_memory(Law(5e-4, 4e-3), given), given, 50)
+    assert draws.slip_time is None
+    assert draws.deviations.shape == (2, 50)
 
 
 def test_fourth_differences_size_the_camera(made):

@@ -8,7 +8,7 @@ from support.diagnoses import made_up
 
 from jaxident.diagnosis.causes.corrector import Term
 from jaxident.diagnosis.causes.which import Candidate
-from jaxident.diagnosis.noise import Law
+from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.verdict import alike, judge, slip_of_drive, unknown_probability
 
 NONE: dict[str, float] = {}

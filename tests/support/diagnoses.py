@@ -11,7 +11,7 @@ from jaxident.diagnosis.extent.floor import Floor
 from jaxident.diagnosis.extent.shrink import Shrink
 from jaxident.diagnosis.extent.where import Place, Region
 from jaxident.diagnosis.motion.coordinates import COORDINATES, NOMINAL
-from jaxident.diagnosis.noise import Law
+from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.prepare import Frames, Prepared
 from jaxident.diagnosis.replay import Replay
 from jaxident.diagnosis.verdict import Cause, Judgement

@@ -11,7 +11,8 @@ from jaxident.diagnosis.causes.rhythm import rhythms
 from jaxident.diagnosis.causes.search import Data, Solution
 from jaxident.diagnosis.motion.linear import gram, normal
 from jaxident.diagnosis.motion.responses import Responses
-from jaxident.diagnosis.noise import Law, size_noise, white_whitener, whitener_of
+from jaxident.diagnosis.noise.law import Law, white_whitener, whitener_of
+from jaxident.diagnosis.noise.sizing import size_noise
 
 SIDES = ("right", "left")
 UNEXPLAINED = 0.2

@@ -12,7 +12,8 @@ from jaxident.diagnosis.causes.unexplained import unexplained
 from jaxident.diagnosis.motion.coordinates import COORDINATES, NOMINAL, SHAPES, free_places, neutral_vector
 from jaxident.diagnosis.motion.responses import Responses, respond
 from jaxident.diagnosis.motion.windows import Windows
-from jaxident.diagnosis.noise import WORTH, Law, size_noise, whitener_of
+from jaxident.diagnosis.noise.law import Law, whitener_of
+from jaxident.diagnosis.noise.sizing import WORTH, size_noise
 from jaxident.effects.catalogue import CATALOGUE
 
 REFITS, KEPT = 6, 4

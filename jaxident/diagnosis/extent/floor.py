@@ -13,7 +13,8 @@ from jaxident.diagnosis.causes.search import Solution
 from jaxident.diagnosis.extent.gap import Ends, ends_of, in_channels
 from jaxident.diagnosis.motion.responses import Responses
 from jaxident.diagnosis.motion.windows import Windows
-from jaxident.diagnosis.noise import Law, covariance
+from jaxident.diagnosis.noise.doubt import Draws
+from jaxident.diagnosis.noise.law import Law, covariance
 
 REPLAYS = 500
 
@@ -28,20 +29,20 @@ class Floor(NamedTuple):
 
 
 def floor_of(
-    residual: Array, windows: Windows, law: Law, doubt: Array, responses: Responses, ends: Ends, seed: int = 0
+    residual: Array, windows: Windows, law: Law, draws: Draws, responses: Responses, ends: Ends, seed: int = 0
 ) -> Floor:
-    """The floor about the path of a model with some residuals (windows, numbers); doubt (variances, variances) is the
-    covariance of the logarithms of the law's variances."""
+    """The floor about the path of a model with some residuals (windows, numbers); `draws` are of the law, one for each
+    replay."""
     seen = np.asarray(windows.seen)[-1]
     factor = np.linalg.cholesky(covariance(law, windows, responses))
     channels = np.sum(in_channels(ends.of(factor), residual, windows, law) ** 2, axis=2)[seen]
     rng = np.random.default_rng(seed)
-    factors = np.exp(0.5 * rng.multivariate_normal(np.zeros(len(doubt)), doubt, REPLAYS).T)
-    squares = np.zeros((int(seen.sum()), 3, REPLAYS))
+    replays = draws.deviations.shape[1]
+    squares = np.zeros((int(seen.sum()), 3, replays))
     for run in np.unique(windows.run[seen]):
         own = windows.run == run
-        replayed = np.zeros((len(seen), 3, REPLAYS))
-        replayed[own] = _replay(rng, law, factors, windows, responses, ends, np.flatnonzero(own))
+        replayed = np.zeros((len(seen), 3, replays))
+        replayed[own] = _replay(rng, draws, windows, responses, ends, np.flatnonzero(own))
         turned = in_channels(replayed, residual, windows, law)
         squares[own[seen]] = turned[own & seen] ** 2
     return Floor(float(np.mean(channels)), squares.mean(axis=(0, 1)), channels)
@@ -61,32 +62,32 @@ def wander_of(solution: Solution, windows: Windows, law: Law, inverse: Array, se
     return np.mean(moved**2, axis=(0, 1))
 
 
-def _replay(rng, law: Law, factors: Array, windows: Windows, responses: Responses, ends: Ends, chosen) -> np.ndarray:
-    """Last errors (windows, 3, replays) in x, y, heading of the chosen windows of one run; factors (variances, replays)
-    are of the deviations."""
+def _replay(rng, draws: Draws, windows: Windows, responses: Responses, ends: Ends, chosen) -> np.ndarray:
+    """Last errors (windows, 3, replays) in x, y, heading of the chosen windows of one run."""
     t = windows.t[:, windows.run[chosen[0]]]
     places = np.minimum(windows.first[chosen, None] + np.arange(len(windows.step)), len(t) - 1)
-    deviations = iter(factors)
+    deviations, replays = iter(draws.deviations), draws.deviations.shape[1]
 
-    def camera(values: Array, position: float, heading: float) -> np.ndarray:
+    def camera(values: Array) -> np.ndarray:
         """Numbers (windows, numbers, replays) of pose errors (rows of the run, 3, replays) of unit size."""
-        flat, turn = position * next(deviations), heading * next(deviations)
-        return (values * np.stack([flat, flat, turn]))[places].reshape(len(chosen), -1, REPLAYS)
+        flat, turn = next(deviations), next(deviations)
+        return (values * np.stack([flat, flat, turn]))[places].reshape(len(chosen), -1, replays)
 
-    found = camera(rng.normal(size=(len(t), 3, REPLAYS)), law.position, law.heading)
-    if law.slip is not None:
-        for size, answer in zip(law.slip, (responses.along, responses.heading), strict=True):
-            slip = size * next(deviations) * _remembering(rng, t, law.slip_time, (REPLAYS,))
+    found = camera(rng.normal(size=(len(t), 3, replays)))
+    if draws.slip_time is not None:
+        for answer in (responses.along, responses.heading):
+            slip = next(deviations) * _remembering(rng, t, draws.slip_time, (replays,))
             found += answer[chosen] @ slip[places]
-    if law.coloured is not None:
-        found += camera(_remembering(rng, t, law.coloured_time, (3, REPLAYS)), *law.coloured)
+    if draws.coloured_time is not None:
+        found += camera(_remembering(rng, t, draws.coloured_time, (3, replays)))
     return Ends(ends.early[chosen]).of(found)
 
 
-def _remembering(rng, t: Array, memory: float | None, shape: tuple[int, ...]) -> np.ndarray:
-    """Normal numbers (rows, *shape) of variance 1 whose correlation falls over a memory [s]."""
+def _remembering(rng, t: Array, memory: Array | float, shape: tuple[int, ...]) -> np.ndarray:
+    """Normal numbers (rows, *shape) of variance 1 whose correlation falls over a memory [s], of all or of each entry
+    of the last axis."""
     found = rng.normal(size=(len(t), *shape))
-    kept = np.exp(-np.maximum(np.diff(t), 0.0) / (memory or 1e-9))
+    kept = np.exp(-np.maximum(np.diff(t), 0.0)[:, None] / memory)
     for row, share in enumerate(kept):
         found[row + 1] = share * found[row] + np.sqrt(1.0 - share**2) * found[row + 1]
     return found

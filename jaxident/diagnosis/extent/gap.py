@@ -12,7 +12,7 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.motion.linear import follow
 from jaxident.diagnosis.motion.responses import Responses, answer_to_start, modelled_path
 from jaxident.diagnosis.motion.windows import Windows
-from jaxident.diagnosis.noise import Law, covariance
+from jaxident.diagnosis.noise.law import Law, covariance
 
 STEPS = 3
 """Of the search for a window's start state."""

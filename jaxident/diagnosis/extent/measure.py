@@ -7,15 +7,17 @@ import numpy as np
 from jaxident.diagnosis.causes.search import Solution
 from jaxident.diagnosis.causes.unexplained import UNEXPLAINED
 from jaxident.diagnosis.causes.which import Finding
-from jaxident.diagnosis.extent.floor import Floor, floor_of, wander_of
+from jaxident.diagnosis.extent.floor import REPLAYS, Floor, floor_of, wander_of
 from jaxident.diagnosis.extent.gap import deviations, early_inverse, ends_of, last_errors, settle
 from jaxident.diagnosis.extent.shrink import HIGH, LOW, Shrink, shrink_of
 from jaxident.diagnosis.extent.where import Place, increments, locate
 from jaxident.diagnosis.motion.coordinates import COORDINATES, NOMINAL, PLACES, neutral_vector
 from jaxident.diagnosis.motion.linear import follow
-from jaxident.diagnosis.motion.responses import modelled_path, respond
+from jaxident.diagnosis.motion.responses import Responses, modelled_path, respond
 from jaxident.diagnosis.motion.windows import Windows, cut
-from jaxident.diagnosis.noise import Law, doubt_of, white_whitener
+from jaxident.diagnosis.noise.doubt import Draws, draw_laws, sizes_by_memory
+from jaxident.diagnosis.noise.law import Law, white_whitener
+from jaxident.diagnosis.noise.sizing import Sized, sample
 from jaxident.diagnosis.prepare import BURN, Prepared, first_starts
 from jaxident.errors import InputError
 from jaxident.log import Log
@@ -45,8 +47,9 @@ def measure(prepared: Prepared, finding: Finding, given, common, seed: int = 0) 
     """The gap on windows kept for it, before and after, where it lies, and the shrink of each single effect; `given`
     (10,) or (SIZE,) is the model as given, `common` are effects that it has already."""
     windows = judging_windows(prepared, len(prepared.windows.step))
-    law = finding.law if finding.unexplained > UNEXPLAINED else finding.likely
     best = finding.candidates[finding.selected].solution
+    fitted = respond(np.exp(best.vector[:2]), best.linear.residual, finding.data.windows)
+    law, draws = _laws(finding, best, fitted, seed)
     singles = {e[0]: c for e, c in finding.candidates.items() if len(e) == 1}
     base = _with(finding, common).vector
     told = base if given is None else np.concatenate([given, finding.nominal.vector[len(given) :]])
@@ -54,11 +57,9 @@ def measure(prepared: Prepared, finding: Finding, given, common, seed: int = 0) 
     responses, residual, starts = _settled(best.vector, windows, law)
     inverse = early_inverse(law, windows, responses, BURN)
     found = last_errors(vectors, np.tile(starts, (len(vectors), 1, 1)), windows, law, inverse) ** 2
-    fitted = respond(np.exp(best.vector[:2]), best.linear.residual, finding.data.windows)
-    doubt = doubt_of(law, best.linear.residual, best.linear.starts, finding.data.windows, fitted, finding.data.use)
     ends = ends_of(best.vector, residual, windows, inverse)
     own_inverse = early_inverse(law, finding.data.windows, fitted, BURN)
-    replay = floor_of(residual, windows, law, doubt, responses, ends, seed)
+    replay = floor_of(residual, windows, law, draws, responses, ends, seed)
 
     def shrink(squares, solution: Solution) -> Shrink:
         wander = wander_of(solution, finding.data.windows, law, own_inverse, seed)
@@ -75,6 +76,17 @@ def measure(prepared: Prepared, finding: Finding, given, common, seed: int = 0) 
     floor[np.asarray(windows.seen)[-1]] = replay.channels
     moved = moved_by(finding, common, starts, windows, law)
     return gap, locate(found[1], floor, residual, windows, moved, seed), shrinks
+
+
+def _laws(finding: Finding, best: Solution, fitted: Responses, seed: int) -> tuple[Law, Draws]:
+    """The law that the floor takes, and draws of laws as likely. Slip's memory is sized finely, unless something
+    is left unexplained, which slip would take up."""
+    data = finding.data
+    given = sample(best.linear.residual, best.linear.starts, data.windows, fitted, data.use)
+    unknown = finding.unexplained > UNEXPLAINED
+    sizes = [Sized(finding.law, 0.0)] if unknown else sizes_by_memory(finding.likely, given)
+    likeliest = max(sizes, key=lambda sized: sized.log_likelihood).law
+    return likeliest, draw_laws(sizes, given, REPLAYS, seed)
 
 
 def moved_by(finding: Finding, common: tuple[str, ...], starts, windows: Windows, law: Law) -> np.ndarray | None:

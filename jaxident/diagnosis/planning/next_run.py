@@ -18,7 +18,7 @@ from jaxident.diagnosis.motion.linear import START_STATES, follow, gram, left_ov
 from jaxident.diagnosis.motion.paths import track
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.motion.windows import Windows, cut, uncut
-from jaxident.diagnosis.noise import whitener_of
+from jaxident.diagnosis.noise.law import whitener_of
 from jaxident.diagnosis.planning.question import Question, ask, check_names, expected_size, noise_of
 from jaxident.diagnosis.planning.trial_inputs import ORDINARY, draw, make, vary
 from jaxident.log import Log, make_log

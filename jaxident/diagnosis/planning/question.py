@@ -15,7 +15,7 @@ from jaxident.diagnosis.motion.coordinates import (
     nominal_vector,
     unit_factors,
 )
-from jaxident.diagnosis.noise import Law
+from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.prepare import BURN, horizon_rows
 from jaxident.diagnosis.translate import scaled
 from jaxident.effects.catalogue import CATALOGUE

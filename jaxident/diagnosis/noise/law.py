@@ -1,0 +1,100 @@
+"""What is random: the camera's error, white or with a memory, and slip of the wheels; and the covariance that it gives
+the poses of a window, which is linear in the variances. NumPy, windows first."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxident.array_types import Array
+from jaxident.diagnosis.motion.responses import Responses
+from jaxident.diagnosis.motion.windows import Windows
+
+EVERY = slice(None)
+
+
+class Law(NamedTuple):
+    """Standard deviations: white camera error [m], [rad]; slip as an acceleration [m/s^2], [rad/s^2] of correlation
+    time [s], None without; camera error with a memory, None without."""
+
+    position: float
+    heading: float
+    slip: tuple[float, float] | None = None
+    slip_time: float | None = None
+    coloured: tuple[float, float] | None = None
+    coloured_time: float | None = None
+
+
+def first_law(windows: Windows) -> Law:
+    """Camera error by fourth differences of the poses, which motion hardly enters; the median forgives switches."""
+    pose, seen = np.asarray(windows.pose), np.asarray(windows.seen)
+    whole = np.all([seen[k : len(seen) - 4 + k] for k in range(5)], axis=0)
+    found: list[float] = []
+    for k in range(3):
+        column = np.unwrap(pose[..., k], axis=0) if k == 2 else pose[..., k]
+        change = np.diff(column, n=4, axis=0)[whole]
+        found.append(float(np.median(np.abs(change))) / 0.6745 / np.sqrt(70.0) if change.size else 1e-3)
+    return Law(max(float(np.hypot(found[0], found[1])) / 2.0**0.5, 1e-7), max(found[2], 1e-7))
+
+
+def covariance(law: Law, windows: Windows, responses: Responses, chosen: slice = EVERY) -> np.ndarray:
+    """Covariance (windows, numbers, numbers) of the poses, or of some numbers of every window; unseen ones stand alone
+    with variance 1."""
+    one = np.arange(3 * len(windows.step))[chosen]
+    numbers = np.tile(one, (len(windows.run), 1))
+    parts = parts_of(law.slip_time, law.coloured_time, windows, responses, numbers)
+    total = sum(variance * part for variance, part in zip(variances_of(law), parts, strict=True))
+    return total + of_unseen(windows, numbers)
+
+
+def whitener_of(law: Law, windows: Windows, responses: Responses) -> np.ndarray:
+    """The inverse Cholesky factor (windows, numbers, numbers) of the covariance; rows of unseen poses are zero."""
+    factor = np.linalg.inv(np.linalg.cholesky(covariance(law, windows, responses)))
+    return factor * numbers_seen(windows)[:, :, None]
+
+
+def white_whitener(law: Law, windows: Windows) -> np.ndarray:
+    """The whitener (windows, numbers, numbers) of white camera noise alone; diagonal."""
+    seen = numbers_seen(windows)
+    scale = np.tile(1.0 / np.array([law.position, law.position, law.heading]), len(windows.step))
+    return np.eye(len(scale)) * scale * seen[:, :, None]
+
+
+def variances_of(law: Law) -> np.ndarray:
+    """The variances (variances,) of a law, in the order of `parts_of`."""
+    return np.array([law.position, law.heading, *(law.slip or ()), *(law.coloured or ())]) ** 2
+
+
+def parts_of(slip_time, coloured_time, windows: Windows, responses: Responses, numbers: Array) -> list[np.ndarray]:
+    """What each variance multiplies (windows, n, n), for some numbers (windows, n)."""
+    seen = numbers_of(numbers_seen(windows), numbers)
+    both = seen[:, :, None] * seen[:, None, :]
+    of_position, of_heading = (numbers % 3 < 2)[:, None], (numbers % 3 == 2)[:, None]
+    parts = [both * np.eye(numbers.shape[1]) * wanted for wanted in (of_position, of_heading)]
+    step = np.asarray(windows.step).T
+    time = np.cumsum(step, axis=1) - step
+    if slip_time is not None:
+        memory = np.exp(-np.abs(time[:, :, None] - time[:, None, :]) / slip_time)
+        answers = (numbers_of(g, numbers) for g in (responses.along, responses.heading))
+        parts += [both * (g @ memory @ g.transpose(0, 2, 1)) for g in answers]
+    if coloured_time is not None:
+        own = numbers_of(time, numbers // 3)
+        memory = np.exp(-np.abs(own[:, :, None] - own[:, None, :]) / coloured_time)
+        same = (numbers % 3)[:, :, None] == (numbers % 3)[:, None]
+        parts += [both * memory * (same & wanted) for wanted in (of_position, of_heading)]
+    return parts
+
+
+def numbers_seen(windows: Windows) -> np.ndarray:
+    """1 or 0 (windows, numbers)."""
+    return np.repeat(np.asarray(windows.seen).T, 3, axis=1).astype(float)
+
+
+def of_unseen(windows: Windows, numbers: Array) -> np.ndarray:
+    """Variance 1 (windows, n, n) for those of some numbers (windows, n) that were not seen."""
+    unseen = 1.0 - numbers_of(numbers_seen(windows), numbers)
+    return unseen[:, :, None] * np.eye(unseen.shape[1])
+
+
+def numbers_of(values: Array, numbers: Array) -> np.ndarray:
+    """Some numbers (windows, n) of values (windows, numbers, ...)."""
+    return np.take_along_axis(values, numbers.reshape(*numbers.shape, *[1] * (values.ndim - 2)), axis=1)

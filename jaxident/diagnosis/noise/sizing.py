@@ -1,0 +1,153 @@
+"""What is random: the camera's error, white or with a memory, and slip of the wheels, sized from the residuals.
+
+Restricted likelihood (Patterson and Thompson 1971, Biometrika 58): every window's start state is eliminated, so that
+what it takes up of the residuals is not lost from the noise. The covariance is linear in the variances, which are
+searched by average information (Gilmour, Thompson and Cullis 1995, Biometrics 51). NumPy, windows first.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxident.array_types import Array
+from jaxident.diagnosis.motion.responses import Responses
+from jaxident.diagnosis.motion.windows import Windows
+from jaxident.diagnosis.noise.law import Law, first_law, numbers_of, of_unseen, parts_of, variances_of
+
+MOST_STEPS = 12
+SAMPLE, ROWS = 60, 20
+"""Windows from which noise is sized, spread evenly, and rows of each that have a pose: slip is slow, and few rows show
+it."""
+SLIP_TIMES = (0.05, 0.2, 0.8)
+CAMERA_TIMES = (0.1, 0.5)
+HOPE = 5.0
+"""Times what its last step gained: what a search can still be expected to."""
+WORTH, MEMORY_WORTH = 6.0, 20.0
+"""Gain of log-likelihood for which slip is believed, two variances and a correlation time; and a memory of the camera,
+which is claimed as an effect: what a model's form leaves looks like a small one."""
+
+
+class Sample(NamedTuple):
+    """Some windows and some numbers of each: residuals (windows, n), derivatives by start states (windows, n, 5), the
+    windows and their responses, whole, and which numbers (windows, n) these are."""
+
+    residual: Array
+    starts: Array
+    windows: Windows
+    responses: Responses
+    numbers: Array
+
+
+class Sized(NamedTuple):
+    """A law and the restricted log-likelihood of the windows it was sized on."""
+
+    law: Law
+    log_likelihood: float
+
+
+def size_noise(
+    residual: Array, starts: Array, windows: Windows, responses: Responses, use: Array, worth: float = WORTH
+) -> Law:
+    """The likeliest law: white, with slip, with a camera memory, each only where it is worth its terms; from residuals
+    (windows, numbers) and derivatives by start states (windows, numbers, 5) of the windows in `use` (boolean). worth:
+    the gain for which slip is believed."""
+    given = sample(residual, starts, windows, responses, use)
+    begin = first_law(windows)
+    base = size_one(given, begin, None, None)
+    slips = [size_one(given, begin, time, None, rival=base.log_likelihood) for time in SLIP_TIMES]
+    slip = max(slips, key=lambda s: s.log_likelihood)
+    base = slip if slip.log_likelihood > base.log_likelihood + worth else base
+    needed = base.log_likelihood + MEMORY_WORTH
+    memories = [size_one(given, begin, None, time, rival=needed) for time in CAMERA_TIMES]
+    memory = max(memories, key=lambda s: s.log_likelihood)
+    rival = max(needed, memory.log_likelihood + WORTH)
+    both = size_one(given, begin, slip.law.slip_time, memory.law.coloured_time, rival=rival)
+    if both.log_likelihood > rival:
+        return both.law
+    return memory.law if memory.log_likelihood > needed else base.law
+
+
+def sample(residual: Array, starts: Array, windows: Windows, responses: Responses, use: Array) -> Sample:
+    """What sizes the noise, of residuals (windows, numbers) and derivatives by start states (windows, numbers, 5)."""
+    chosen = np.flatnonzero(use)
+    chosen = chosen[np.unique(np.linspace(0, len(chosen) - 1, min(SAMPLE, len(chosen))).round().astype(int))]
+    own = take(windows, chosen)
+    part = Responses(*(leaf[chosen] for leaf in responses))
+    length = len(own.seen)
+    rows = _rows_seen(np.asarray(own.seen), len(range(0, length, max(1, length // ROWS))))
+    numbers = (3 * rows[:, :, None] + np.arange(3)).reshape(len(rows), -1)
+    return Sample(numbers_of(residual[chosen], numbers), numbers_of(starts[chosen], numbers), own, part, numbers)
+
+
+def _rows_seen(seen: Array, count: int) -> np.ndarray:
+    """Rows (windows, count) spread over those that are seen (rows, windows) in each window; where these are too few,
+    all of them and some others."""
+    order = np.argsort(~seen.T, axis=1, kind="stable")
+    found, place = seen.sum(axis=0)[:, None], np.arange(count)
+    return np.sort(np.take_along_axis(order, np.where(found >= count, place * found // count, place), axis=1), axis=1)
+
+
+def take(windows: Windows, chosen: Array) -> Windows:
+    """Some of the windows; the runs stay whole."""
+    return windows._replace(
+        step=windows.step[:, chosen], pose=windows.pose[:, chosen], seen=windows.seen[:, chosen],
+        run=windows.run[chosen], first=windows.first[chosen],
+    )  # fmt: skip
+
+
+def size_one(
+    given: Sample, begin: Law, slip_time: float | None, coloured_time: float | None, rival: float = -np.inf
+) -> Sized:
+    """The best variances of one structure, or poorer ones if it is far from beating a rival's log-likelihood."""
+    residual, starts, windows, responses, numbers = given
+    parts = parts_of(slip_time, coloured_time, windows, responses, numbers)
+    size = variances_of(begin)
+    if len(size) < len(parts):  # as much as the camera's variance at the poses
+        means = [float(np.mean(np.diagonal(part, axis1=1, axis2=2))) for part in parts[2:]]
+        size = np.array([*size[:2], *(size[0] / max(mean, 1e-300) for mean in means)])
+    theta, value = _search(residual, starts, parts, size, of_unseen(windows, numbers), rival)
+    sd = np.sqrt(theta)
+    slip = (float(sd[2]), float(sd[3])) if slip_time is not None else None
+    coloured = (float(sd[-2]), float(sd[-1])) if coloured_time is not None else None
+    return Sized(Law(float(sd[0]), float(sd[1]), slip, slip_time, coloured, coloured_time), value)
+
+
+def _search(residual: Array, starts: Array, parts, theta: Array, alone: Array, rival: float):
+    """Variances of the highest restricted likelihood, and that likelihood; without hope against a rival it stops."""
+    damping, best, value, slope, curve = 1e-3, theta, -np.inf, None, None
+    proposed = theta
+    for _ in range(MOST_STEPS):
+        found = likelihood(residual, starts, parts, proposed, alone)
+        gained = found[0] - value
+        if gained >= 0.0 or slope is None:
+            best, (value, slope, curve), damping = proposed, found, 0.3 * damping
+            if 0.0 <= gained < 0.02 or value + HOPE * gained < rival:
+                break
+        else:
+            damping *= 10.0
+        # in logarithms of the variances
+        gradient, matrix = best * slope, best[:, None] * curve * best
+        matrix = matrix + (damping + 1e-9) * np.diag(np.diagonal(matrix) + 1e-3)
+        proposed = best * np.exp(np.clip(np.linalg.solve(matrix, gradient), -3.0, 3.0))
+    return best, float(value)
+
+
+def likelihood(residual: Array, starts: Array, parts, theta: Array, alone: Array):
+    """Restricted log-likelihood, its gradient and average information in the variances."""
+    total = sum(t * part for t, part in zip(theta, parts, strict=True)) + alone
+    inverse = np.linalg.inv(total)
+    weighted = inverse @ starts
+    information = starts.transpose(0, 2, 1) @ weighted
+    scale = np.sqrt(np.diagonal(information, axis1=1, axis2=2))[:, :, None]
+    scale = np.where(scale > 0.0, scale, 1.0)  # a window without any pose among these numbers
+    information = information / scale / scale.transpose(0, 2, 1) + 1e-12 * np.eye(5)
+    weighted = weighted / scale.transpose(0, 2, 1)
+    inverse = inverse - weighted @ np.linalg.solve(information, weighted.transpose(0, 2, 1))
+    taken = (inverse @ residual[..., None])[..., 0]
+    moved = np.stack([(part @ taken[..., None])[..., 0] for part in parts])
+    back = (inverse @ moved[..., None])[..., 0]
+    slope = np.array([0.5 * (np.sum(m * taken) - np.sum(inverse * part)) for m, part in zip(moved, parts, strict=True)])
+    curve = 0.5 * np.einsum("iwa,jwa->ij", moved, back)
+    determinant = sum(np.sum(np.linalg.slogdet(matrix)[1]) for matrix in (total, information))
+    determinant += 2.0 * np.sum(np.log(scale))
+    return -0.5 * (determinant + np.sum(residual * taken)), slope, curve
