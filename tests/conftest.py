@@ -1,12 +1,13 @@
 """JAX set up as the program does; paths of the material that lies beside the project, where it does."""
 
+import os
 import pathlib
 
 import pytest
 
 from jaxident.start import start_jax
 
-start_jax(cache=False)  # as the program does
+start_jax(cache="JAXIDENT_CACHE" in os.environ)  # as the program does; a folder given for it is fresh and the run's own
 
 SHARED = pathlib.Path(__file__).resolve().parents[2] / "shared"
 
