@@ -120,6 +120,7 @@ def in_blocks(function: Callable[..., Any], size: int) -> Callable[..., Any]:
     Elsewhere all trials run at once. A block takes every so-manieth trial, which keeps a trial axis that is cut over
     devices where it is.
     """
+    function = jax.jit(function)  # traced once, for one trial and for blocks of them
     mapped = jax.custom_batching.custom_vmap(function)
 
     @mapped.def_vmap
