@@ -38,7 +38,7 @@ def sizes_by_memory(law: Law, given: Sample) -> list[Sized]:
 
 def draw_laws(sizes: list[Sized], given: Sample, count: int, seed: int = 0) -> Draws:
     """As many laws as asked for, of one structure, each as often as it is likely."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng([seed, 1])  # apart from that of the replays
     logs = np.array([sized.log_likelihood for sized in sizes])
     weights = np.exp(logs - logs.max())
     weights = np.where(weights < FEWEST * weights.sum(), 0.0, weights)
