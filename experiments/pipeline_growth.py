@@ -17,12 +17,15 @@ import jax
 
 import jaxident as ji
 from jaxident.study.batch import in_parallel
-from jaxident.study.bench import TRIAL_BLOCK, TRIAL_SAMPLES, trial
+from jaxident.study.bench import TRIAL_SAMPLES, trial
+from jaxident.study.engine import BLOCK
 
 ROBOT = ji.load_model("published")
 SAMPLES = (250, 500, 1000, 2000, 4000, 8000, 16000)
 TRIALS = (100, 1000, 10_000, 100_000)
 REPEATS = 3
+AT_ONCE = BLOCK["cpu"]
+"""Trials of a block, as in studies."""
 
 
 def measure(samples: int, count: int, block: int) -> tuple[float, float]:
@@ -45,11 +48,11 @@ def main() -> None:
     parser.add_argument("--largest", type=int, default=TRIALS[-1], help="most trials")
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("pipeline_growth.csv"))
     options = parser.parse_args()
-    sizes = [(samples, 2 * TRIAL_BLOCK) for samples in SAMPLES]
+    sizes = [(samples, 4 * AT_ONCE) for samples in SAMPLES]
     sizes += [(TRIAL_SAMPLES, count) for count in TRIALS if count <= options.largest]
     rows = [["samples", "trials", "wall [us] a trial", "processor [us] a trial", "processor [ns] a trial-sample"]]
     for samples, count in sizes:
-        wall, used = measure(samples, count, min(TRIAL_BLOCK, count // 2))
+        wall, used = measure(samples, count, AT_ONCE)
         row = (1e6 * wall / count, 1e6 * used / count, 1e9 * used / (count * samples))
         rows.append([str(samples), str(count), *(f"{value:.0f}" for value in row)])
         print(" | ".join(rows[-1]), flush=True)
