@@ -8,7 +8,6 @@ processor; compare rows of one run.
 """
 
 import argparse
-import csv
 import dataclasses
 import pathlib
 import time
@@ -18,6 +17,7 @@ import numpy as np
 
 import jaxident as ji
 from experiments.diagonal import PERIOD, ROBOT
+from experiments.rows import write_rows
 from jaxident.log import Log, join
 from jaxident.robot.model import Effect
 from jaxident.study.synthetic import excite, simulate_runs
@@ -52,8 +52,7 @@ def main() -> None:
         named = " ".join(found.selected)
         rows.append([str(runs), str(samples), *(f"{s:.1f}" for s in (first, again, processor)), found.verdict, named])
         print(" ".join(rows[-1]), flush=True)
-    with open(options.out, "w", newline="") as stream:
-        csv.writer(stream, lineterminator="\n").writerows(rows)
+    write_rows(options.out, rows)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,6 @@ from jaxident.robot.model import require_physical
 PUBLISHED = ji.load_model("published")
 DRIVE = Physical(*(np.array(part) for part in require_physical(PUBLISHED)[:2]))
 ROBOT = dataclasses.replace(PUBLISHED, dynamics=DRIVE)
-PERIOD = float(ROBOT.sample_period)
+PERIOD = float(ROBOT.sample_period)  # [s]
 TRUTH = np.concatenate([DRIVE.rate, np.ravel(DRIVE.gain), ROBOT.dead_zone])
-"""Eight numbers: two rates, four gains, two dead zones."""
+"""Eight numbers: two rates [1/s], four gains [m/s^2, m/s^2, rad/s^2, rad/s^2 per unit of command], two dead zones."""

@@ -8,7 +8,6 @@ values take the same time whatever the samples: growth with samples is judged by
 """
 
 import argparse
-import csv
 import pathlib
 import statistics
 import time
@@ -16,6 +15,7 @@ import time
 import jax
 
 import jaxident as ji
+from experiments.rows import write_rows
 from jaxident.study.batch import in_parallel
 from jaxident.study.bench import TRIAL_SAMPLES, trial
 from jaxident.study.engine import BLOCK
@@ -56,8 +56,7 @@ def main() -> None:
         row = (1e6 * wall / count, 1e6 * used / count, 1e9 * used / (count * samples))
         rows.append([str(samples), str(count), *(f"{value:.0f}" for value in row)])
         print(" | ".join(rows[-1]), flush=True)
-    with open(options.out, "w", newline="") as stream:
-        csv.writer(stream, lineterminator="\n").writerows(rows)
+    write_rows(options.out, rows)
 
 
 if __name__ == "__main__":

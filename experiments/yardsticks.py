@@ -9,13 +9,13 @@ parameters as the root of their mean square. Failed fits are in no error, but co
 """
 
 import argparse
-import csv
 import pathlib
 
 import numpy as np
 
 import jaxident as ji
 from experiments.diagonal import ROBOT
+from experiments.rows import write_rows
 from jaxident.robot.model import DIFFERENCE_ORDER
 from jaxident.study.dataset import study_arrays
 from jaxident.study.design import Candidate, Study
@@ -74,8 +74,7 @@ def main() -> None:
                 cells.append(f"{short(rms, 3)} ± {short(spread, 1)} ({short(median, 2)})")
             rows.append([f"{1e3 * level:g}", name, f"{np.sum(~good)}", *cells])
             print(" | ".join(rows[-1]), flush=True)
-    with open(options.out, "w", newline="") as stream:
-        csv.writer(stream, lineterminator="\n").writerows(rows)
+    write_rows(options.out, rows)
 
 
 if __name__ == "__main__":

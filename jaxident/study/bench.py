@@ -82,7 +82,8 @@ def _at(robot: Model, setup: Observations) -> recursive.Estimate:
 
 
 def trial(robot: Model, key: Array, samples: int = TRIAL_SAMPLES) -> tuple[Array, Array]:
-    """One whole trial: own excitation, simulation, camera noise, start values, recursion. Estimate (12,), and ok."""
+    """One whole trial of `samples` rows: own excitation, simulation, camera noise, start values, recursion. Estimate
+    (12,), and ok."""
     key_input, key_noise = jax.random.split(key)
     period = jnp.asarray(robot.sample_period)
     command = multilevel(key_input, samples)

@@ -15,7 +15,7 @@ from jaxident.diagnosis.noise.sizing import Sample, Sized, likelihood, size_one
 
 MEMORIES = tuple(np.geomspace(0.025, 1.6, 11).tolist())
 """Correlation times of slip [s] that are looked at, a factor of 1.5 apart."""
-FEWEST = 1e-3
+SMALLEST = 1e-3
 """Share of all likelihood below which a memory is not drawn."""
 
 
@@ -32,7 +32,7 @@ def sizes_by_memory(law: Law, given: Sample) -> list[Sized]:
     """The law sized again for each memory of slip; itself alone without slip."""
     if law.slip is None:
         return [Sized(law, 0.0)]
-    rival = size_one(given, law, law.slip_time, law.coloured_time).log_likelihood + np.log(FEWEST)
+    rival = size_one(given, law, law.slip_time, law.coloured_time).log_likelihood + np.log(SMALLEST)
     return [size_one(given, law, time, law.coloured_time, rival) for time in MEMORIES]
 
 
@@ -41,7 +41,7 @@ def draw_laws(sizes: list[Sized], given: Sample, count: int, seed: int = 0) -> D
     rng = np.random.default_rng([seed, 1])  # apart from that of the replays
     logs = np.array([sized.log_likelihood for sized in sizes])
     weights = np.exp(logs - logs.max())
-    weights = np.where(weights < FEWEST * weights.sum(), 0.0, weights)
+    weights = np.where(weights < SMALLEST * weights.sum(), 0.0, weights)
     picks = rng.choice(len(sizes), count, p=weights / weights.sum())
     variances = len(variances_of(sizes[0].law))
     deviations, unit = np.zeros((variances, count)), rng.normal(size=(variances, count))

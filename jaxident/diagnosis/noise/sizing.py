@@ -133,7 +133,8 @@ def _search(residual: Array, starts: Array, parts, theta: Array, alone: Array, r
 
 
 def likelihood(residual: Array, starts: Array, parts, theta: Array, alone: Array):
-    """Restricted log-likelihood, its gradient and average information in the variances."""
+    """Restricted log-likelihood, its gradient (variances,) and average information (variances, variances) in the
+    variances `theta`, each of which multiplies its part (windows, n, n); `alone` as in `of_unseen`."""
     total = sum(t * part for t, part in zip(theta, parts, strict=True)) + alone
     inverse = np.linalg.inv(total)
     weighted = inverse @ starts
