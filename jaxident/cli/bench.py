@@ -15,8 +15,9 @@ def command(trials, seed, json_file):
     """How fast the pipeline is on this machine, in double precision, on all its cores or GPUs.
 
     Nanoseconds per trial-sample of each stage at 1024 trials of 2000 samples, whole trials of 1000 samples per
-    second, and milliseconds for the start values of one trial in a batch, medians of seven; milliseconds for one
-    maximum-likelihood fit in a batch of 64 runs of 1000 samples, the median of three.
+    second, milliseconds for the start values of one trial in a batch, and microseconds for one robot's recursion to
+    take one row, medians of seven; milliseconds for one maximum-likelihood fit in a batch of 64 runs of 1000 samples,
+    the median of three.
 
     Example: jaxident bench --json bench.json
     """

@@ -51,10 +51,12 @@ class Stream(NamedTuple):
 
 
 class State(NamedTuple):
-    """A Stream in one array: the call of a compiled function takes some microseconds for every array that it passes,
-    and a stream has 118. `unpack` opens it."""
+    """A Stream in two arrays of 59 numbers: the call of a compiled function takes some microseconds for every array
+    that it passes, and a stream has 118; where one has 512 bytes or more, XLA's CPU runtime hands single kernels to
+    other threads, which takes longer than they do. `unpack` opens it."""
 
-    values: Any
+    first: Any
+    second: Any
 
 
 _NOTHING = Equation((0.0,) * UNKNOWNS, (0.0,) * len(LOWER), (0.0,) * UNKNOWNS)
@@ -183,14 +185,16 @@ def step(state: State, sample: Sample) -> tuple[State, Info]:
 
 
 def pack(stream: Stream) -> State:
-    """The stream as one array (118,), conditions as 0 and 1."""
-    return State(jnp.stack([jnp.asarray(leaf, float) for leaf in jax.tree.leaves(stream)]))
+    """The stream as two arrays (59,), conditions as 0 and 1."""
+    leaves = [jnp.asarray(leaf, float) for leaf in jax.tree.leaves(stream)]
+    half = len(leaves) // 2
+    return State(jnp.stack(leaves[:half]), jnp.stack(leaves[half:]))
 
 
 def unpack(state: State) -> Stream:
     """The stream inside a state."""
     kinds, structure = jax.tree.flatten(_EMPTY)
-    values = zip(kinds, state.values, strict=True)
+    values = zip(kinds, (*state.first, *state.second), strict=True)
     return jax.tree.unflatten(structure, [value != 0.0 if isinstance(kind, bool) else value for kind, value in values])
 
 

@@ -15,7 +15,7 @@ from jaxident.estimation.initialise import Setup, initialise
 from jaxident.estimation.maximum_likelihood import Fit, fit_runs
 from jaxident.estimation.observations import Observations, complete_observations, observe_log
 from jaxident.estimation.runs import Runs
-from jaxident.log import Log
+from jaxident.log import Log, make_log
 from jaxident.numerics import require_float64
 from jaxident.robot.excitation import multilevel
 from jaxident.robot.model import Model, difference_vector
@@ -34,14 +34,15 @@ TRIAL_BLOCK = 125
 """Whole trials at a time; the search for start values takes fewer of them at once by itself."""
 
 FITS, FIT_SAMPLES, FIT_BLOCK, FIT_REPEATS = 64, 1000, 32, 3
-REPEATS = 7
+REPEATS, STEPS = 7, 1000
 
 
 class Bench(NamedTuple):
     """Nanoseconds per trial-sample of each stage (1024 trials of 2000 samples, double precision), whole trials per
     second (1000 samples each, noise drawn, start values searched), milliseconds per search for start values, each the
-    median of REPEATS; milliseconds per maximum-likelihood fit in a batch of 64 runs of 1000 samples, the median of
-    FIT_REPEATS; seconds that the whole trial took to compile; devices and versions."""
+    median of REPEATS; microseconds that one robot waits for `recursive.step` on one row of plain numbers, the call
+    included; milliseconds per maximum-likelihood fit in a batch of 64 runs of 1000 samples, the median of FIT_REPEATS;
+    seconds that the whole trial took to compile; devices and versions."""
 
     simulate_ns: float
     path_length_ns: float
@@ -49,6 +50,7 @@ class Bench(NamedTuple):
     noise_ns: float
     trials_per_s: float
     initialise_ms: float
+    step_us: float
     maximum_likelihood_ms: float
     compile_s: float
     devices: list[str]
@@ -138,6 +140,24 @@ def start_value_ms(robot: Model, key: Array, count: int) -> float:
     return 1e3 * _time(search, blocks)[1] / count
 
 
+def step_us(robot: Model, key: Array) -> float:
+    """Microseconds per jitted `recursive.step`, one after the other as rows come from a camera."""
+    [(command, pose)] = noisy_runs(robot, key, SETUP_ROWS + 1, 1, 1)
+    columns = [column[0] for column in (*command, *pose)]
+    log = make_log(jnp.arange(SETUP_ROWS + 1) * robot.sample_period, *columns)
+    state = recursive.init(log.rows(0, SETUP_ROWS), d_max=D_MAX)
+    sample = recursive.Sample(*(float(column[-1]) for column in columns))
+    step = jax.jit(recursive.step)
+
+    def take_rows() -> recursive.State:
+        after = state
+        for _ in range(STEPS):
+            after, _info = step(after, sample)
+        return after
+
+    return 1e6 * _time(take_rows, [()])[1] / STEPS
+
+
 def maximum_likelihood_ms(robot: Model, key: Array) -> float:
     """Milliseconds that a maximum-likelihood fit takes per run in a batch of FITS runs of FIT_SAMPLES samples."""
     period = jnp.asarray(robot.sample_period)
@@ -160,6 +180,7 @@ def bench(robot: Model, *, trials: int = 1000, seed: int = 0) -> Bench:
         **stages(robot, keys[0]),
         trials_per_s=per_second,
         initialise_ms=start_value_ms(robot, keys[2], trials),
+        step_us=step_us(robot, keys[2]),
         maximum_likelihood_ms=maximum_likelihood_ms(robot, keys[3]),
         compile_s=compile_s,
         devices=[str(device) for device in jax.devices()],

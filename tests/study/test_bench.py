@@ -13,7 +13,14 @@ ROBOT = load_model("published")
 
 @pytest.fixture
 def small(monkeypatch):
-    for name, value in {"TRIALS": 4, "SAMPLES": 240, "BLOCK": 2, "REPEATS": 1, "TRIAL_SAMPLES": 260}.items():
+    for name, value in {
+        "TRIALS": 4,
+        "SAMPLES": 240,
+        "BLOCK": 2,
+        "REPEATS": 1,
+        "STEPS": 3,
+        "TRIAL_SAMPLES": 260,
+    }.items():
         monkeypatch.setattr(bench, name, value)
     for name, value in {"TRIAL_BLOCK": 2, "FITS": 2, "FIT_SAMPLES": 240, "FIT_BLOCK": 1, "FIT_REPEATS": 1}.items():
         monkeypatch.setattr(bench, name, value)
@@ -34,6 +41,7 @@ def test_every_stage_has_a_figure(small):
 
 
 @pytest.mark.slow
-def test_the_searches_have_figures(small):
+def test_the_searches_and_a_step_have_figures(small):
     assert 0.0 < bench.start_value_ms(ROBOT, jax.random.key(0), 4) < np.inf
+    assert 0.0 < bench.step_us(ROBOT, jax.random.key(0)) < np.inf
     assert 0.0 < bench.maximum_likelihood_ms(ROBOT, jax.random.key(0)) < np.inf
