@@ -5,12 +5,12 @@ from typing import NamedTuple
 
 from jaxident.diagnosis import translate
 from jaxident.diagnosis.causes.direct import direct_effects, direct_evidence
-from jaxident.diagnosis.causes.lost import find_lost
-from jaxident.diagnosis.causes.which import ENOUGH, PENALTY, Finding, search_effects
+from jaxident.diagnosis.causes.which import ENOUGH, Finding
 from jaxident.diagnosis.extent.measure import Gap, measure
 from jaxident.diagnosis.extent.shrink import Shrink
 from jaxident.diagnosis.extent.where import Place
-from jaxident.diagnosis.prepare import Prepared, prepare, repaired
+from jaxident.diagnosis.prepare import Prepared, prepare
+from jaxident.diagnosis.repair import search
 from jaxident.diagnosis.replay import Replay, answers, replay, visible
 from jaxident.diagnosis.simulator import as_simulator, check_units, inspect_simulator, shared
 from jaxident.diagnosis.verdict import Judgement, judge
@@ -21,8 +21,6 @@ from jaxident.robot.model import Model
 
 FEW, FEWEST = 6, 2
 """Windows that naming and judging need before anything is claimed."""
-REPAIRS = 2
-"""Times that lost commands are looked for: a second time under the noise that the first leaves."""
 DIFFERENT = 4.0
 """Standard deviations by which a parameter differs before the verdict says so."""
 
@@ -79,20 +77,19 @@ def diagnose(
     alone. seed: of the replays of noise and the shuffles behind intervals; nothing else is drawn. Needs double
     precision and a minute. InputError for logs that say nothing, and for a simulator in other units."""
     require_float64("diagnose")
-    if sim is not None and model is not None:
-        raise InputError("give the simulator's logs or a model, not both: each is the nominal model to judge")
-    if sim is not None:
-        check_units(sim, logs)
+    check_nominal(logs, sim, model)
     simulator = None if model is None else as_simulator(model, logs)
     prepared, finding = search(prepare(logs, horizon, None if simulator is None else simulator.vector[:10]))
-    simulator = simulator if sim is None else inspect_simulator(sim, prepared, finding)
+    values = None
+    if sim is not None:
+        simulator, finding, values = inspect_simulator(sim, prepared, finding)
     told = None if simulator is None else simulator.vector
     extra = direct_evidence(prepared, finding)
     present = (*finding.selected, *(name for name, evidence in extra.items() if evidence > ENOUGH))
     common, surplus = shared(present, simulator)
     selected = tuple(name for name in present if name not in common)
     gap, where, shrinks = measure(prepared, finding, told, common, seed)
-    judgement = judge(finding, gap, extra, common)
+    judgement = judge(finding, gap, extra, simulator, values)
     known = answers(finding.data, finding.nominal, prepared.largest)
     parameters = compare_parameters(prepared, finding, told, common)
     verdict = decide(prepared, judgement, parameters)
@@ -104,20 +101,12 @@ def diagnose(
                      prepared, finding, surplus)  # fmt: skip
 
 
-def search(prepared: Prepared) -> tuple[Prepared, Finding]:
-    """The search, and again with the commands that arrived where saying that some were lost is worth more than the
-    effects found without: a delay, say, makes every change late, lost commands only some."""
-    finding = search_effects(prepared.windows, prepared.naming, prepared.nominal, prepared.law)
-    for _ in range(REPAIRS):
-        best = finding.candidates[finding.selected]
-        alone, beside = (find_lost(finding.data, solution) for solution in (finding.nominal, best.solution))
-        instead = alone.gain - best.evidence > beside.gain
-        lost, worth = (alone, alone.gain - best.evidence) if instead else (beside, beside.gain)
-        if worth - PENALTY < ENOUGH:
-            break
-        prepared = repaired(prepared, lost, worth - PENALTY)
-        finding = search_effects(prepared.windows, prepared.naming, prepared.nominal, prepared.law)
-    return prepared, finding
+def check_nominal(logs: Log | Sequence[Log], sim: Log | Sequence[Log] | None, model: Model | None) -> None:
+    """InputError where there are two nominal models, or one in other units."""
+    if sim is not None and model is not None:
+        raise InputError("give the simulator's logs or a model, not both: each is the nominal model to judge")
+    if sim is not None:
+        check_units(sim, logs)
 
 
 def compare_parameters(prepared: Prepared, finding: Finding, given, common: tuple[str, ...] = ()) -> list[Parameter]:

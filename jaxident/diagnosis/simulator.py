@@ -5,9 +5,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxident.diagnosis.causes.which import Finding, search_effects
-from jaxident.diagnosis.noise.law import Law
+from jaxident.diagnosis.causes.direct import direct_evidence
+from jaxident.diagnosis.causes.which import ENOUGH, Finding, search_effects
+from jaxident.diagnosis.common import explain_together
+from jaxident.diagnosis.noise.law import Law, first_law
 from jaxident.diagnosis.prepare import Prepared, prepare
+from jaxident.diagnosis.repair import search
 from jaxident.diagnosis.translate import to_coordinates
 from jaxident.effects.checks import check_effects
 from jaxident.errors import InputError
@@ -16,15 +19,20 @@ from jaxident.robot.model import Model
 
 STRIDE = 10
 """Rows over which speeds are taken: camera noise hardly counts."""
+NOISY = 0.5
+"""Part of the robot's camera error from which on a simulator's logs have noise of their own, as those of another robot
+have, and slip."""
 UNITS = 15.0
 """Ratio of speeds beyond which no two robots that are meant to be the same differ."""
 
 
 class Simulator(NamedTuple):
-    """What the user's simulator is: vector (SIZE,) of its nominal parameters and effects, and their names."""
+    """What the user's simulator is: vector (SIZE,) of its nominal parameters and effects, and their names; the search
+    of its logs, None for a model."""
 
     vector: Any
     effects: tuple[str, ...]
+    finding: Finding | None = None
 
 
 def check_units(sim: Log | Sequence[Log], logs: Log | Sequence[Log]) -> None:
@@ -54,13 +62,29 @@ def _answers(log: Log) -> tuple[float, float]:
     return float(np.mean(moved / time)) / command, float(np.median(turn / time)) / command
 
 
-def inspect_simulator(sim: Log | Sequence[Log], prepared: Prepared, finding: Finding) -> Simulator:
-    """Nominal parameters and effects of a simulator from its logs, as far as the robot's camera could tell."""
-    law = Law(finding.law.position, finding.law.heading)
-    own = prepare(sim, None, finding.nominal.vector[:10], prepared, law)
-    everything = np.ones(len(own.naming), bool)
-    found = search_effects(own.windows, everything, own.nominal, law, sized=False)
-    return Simulator(found.candidates[found.selected].solution.vector, found.selected)
+def inspect_simulator(
+    sim: Log | Sequence[Log], prepared: Prepared, finding: Finding
+) -> tuple[Simulator, Finding, dict[tuple[str, ...], tuple[float, tuple[str, ...]]]]:
+    """The simulator behind some logs; the robot's search with the set selected that explains both best together; and
+    what `judge` takes for the values of sets."""
+    own, found = _search(sim, prepared, finding)
+    direct = tuple(name for name, worth in direct_evidence(own, found).items() if worth > ENOUGH)
+    together = explain_together(finding, found)
+    fit = together.simulator.candidates[together.simulator.selected]
+    effects = tuple(name for name in fit.effects if name not in together.missing)
+    return Simulator(fit.solution.vector, (*effects, *direct), together.simulator), together.robot, together.values
+
+
+def _search(sim: Log | Sequence[Log], prepared: Prepared, finding: Finding) -> tuple[Prepared, Finding]:
+    """The search of a simulator's logs: as far as the robot's camera could tell or, where they are as noisy themselves,
+    under their own noise."""
+    law, nominal = Law(finding.law.position, finding.law.heading), finding.nominal.vector[:10]
+    own = prepare(sim, None, nominal, prepared, law)
+    noise = first_law(own.windows)
+    if noise.position > NOISY * law.position or noise.heading > NOISY * law.heading:
+        own = prepare(sim, None, nominal, prepared)
+        return search(own._replace(naming=np.ones(len(own.naming), bool)))
+    return own, search_effects(own.windows, np.ones(len(own.naming), bool), own.nominal, law, sized=False)
 
 
 def as_simulator(model: Model, logs: Log | Sequence[Log]) -> Simulator:

@@ -8,6 +8,7 @@ from jaxident.diagnosis.causes.unexplained import UNEXPLAINED
 from jaxident.diagnosis.causes.which import ENOUGH, Finding
 from jaxident.diagnosis.extent.measure import Gap
 from jaxident.diagnosis.extent.shrink import interval
+from jaxident.diagnosis.simulator import Simulator
 from jaxident.effects.catalogue import CATALOGUE, SITES
 
 TEMPERATURE = 2.0
@@ -51,20 +52,32 @@ class Judgement(NamedTuple):
     sites: dict[str, float]
 
 
-def judge(finding: Finding, gap: Gap, extra: dict[str, float], common: tuple[str, ...] = ()) -> Judgement:
+def judge(
+    finding: Finding,
+    gap: Gap,
+    extra: dict[str, float],
+    simulator: Simulator | None = None,
+    values: dict[tuple[str, ...], tuple[float, tuple[str, ...]]] | None = None,
+) -> Judgement:
     """Probabilities from the candidates, from what they leave unexplained, and from effects found directly in the
-    frames or in the noise law (`extra`: name to evidence). `common` effects are in the simulator already: no gap."""
-    sure = tuple(name for name, evidence in extra.items() if evidence > ENOUGH)
-    weights = {effects: (c.evidence - ENOUGH * len(effects)) / TEMPERATURE for effects, c in finding.candidates.items()}
+    frames or in the noise law (`extra`: name to evidence). What the simulator has already is no gap. values: of every
+    set what it is worth and what of it counts, by `explain_together`; from the candidates alone without."""
+    known_there = () if simulator is None else simulator.effects
+    if values is None:
+        values = {
+            effects: (c.evidence - ENOUGH * len(effects), tuple(name for name in effects if name not in known_there))
+            for effects, c in finding.candidates.items()
+        }
+    sure = {name for name, evidence in extra.items() if evidence > ENOUGH} - set(known_there)
+    weights = {effects: value / TEMPERATURE for effects, (value, _) in values.items()}
     top = max(weights.values())
     total = sum(np.exp(value - top) for value in weights.values())
-    chance = {effects: float(np.exp(value - top) / total) for effects, value in weights.items()}
-    unknown = unknown_probability(finding, gap)
+    unknown = unknown_probability(finding, gap, simulator)
     known = 1.0 - unknown
     sets: dict[tuple[str, ...], float] = {}
-    for effects, p in chance.items():
-        key = tuple(sorted({*effects, *sure} - set(common)))
-        sets[key] = sets.get(key, 0.0) + known * p
+    for effects, value in weights.items():
+        key = tuple(sorted({*values[effects][1], *sure}))
+        sets[key] = sets.get(key, 0.0) + known * float(np.exp(value - top) / total)
     none = sets.pop((), 0.0)
     ordered = sorted(((key, p) for key, p in sets.items() if p > 1e-4), key=lambda pair: -pair[1])
     spare = 1.0 - none - unknown - sum(p for _, p in ordered)
@@ -73,14 +86,34 @@ def judge(finding: Finding, gap: Gap, extra: dict[str, float], common: tuple[str
     return Judgement(none, unknown, ordered, _causes(finding, ordered), _sites(finding, ordered, unknown))
 
 
-def unknown_probability(finding: Finding, gap: Gap) -> float:
+def unknown_probability(finding: Finding, gap: Gap, simulator: Simulator | None = None) -> float:
     """How sure it is that something outside the selected set takes part: terms of the corrector explain more, runs that
-    served nothing else are predicted worse than noise allows, or more is called slip than wheels slip."""
-    rest = sum(gain for _, gain in finding.terms)
+    served nothing else are predicted worse than noise allows, or more is called slip than wheels slip. What a simulator
+    leaves unexplained as well, or calls slip, is no difference between the two."""
+    rest, share = rest_of(finding, simulator)
     large = _logistic((rest - SIGNIFICANT) / SHARPNESS[1])
-    explained = large * _logistic((finding.unexplained - UNEXPLAINED) / SHARPNESS[0])
-    beyond = _beyond(excess_of(gap), EXCESS), _beyond(slip_of_drive(finding), BELIEVABLE)
+    explained = large * _logistic((share - UNEXPLAINED) / SHARPNESS[0])
+    beyond = _beyond(excess_of(gap), EXCESS), _beyond(slip_of_drive(finding), believable_slip(simulator))
     return 1.0 - (1.0 - explained) * (1.0 - beyond[0]) * (1.0 - beyond[1])
+
+
+def rest_of(finding: Finding, simulator: Simulator | None = None) -> tuple[float, float]:
+    """What terms of the corrector explain, and its share of all that is explained; beyond what they explain of as many
+    windows of the simulator."""
+    rest = sum(gain for _, gain in finding.terms)
+    if simulator is not None and simulator.finding is not None:
+        other = simulator.finding
+        windows = float(np.sum(finding.data.use)) / max(float(np.sum(other.data.use)), 1.0)
+        rest = max(rest - windows * sum(gain for _, gain in other.terms), 0.0)
+    return rest, rest / max(finding.candidates[finding.selected].gain + rest, 1e-9)
+
+
+def believable_slip(simulator: Simulator | None = None) -> float:
+    """Random slip, as a part of full drive, that no unknown cause is needed for: BELIEVABLE, or a simulator's own and
+    as much again."""
+    if simulator is None or simulator.finding is None:
+        return BELIEVABLE
+    return max(BELIEVABLE, 2.0 * slip_of_drive(simulator.finding))
 
 
 def excess_of(gap: Gap) -> float:

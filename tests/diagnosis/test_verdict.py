@@ -9,6 +9,7 @@ from support.diagnoses import made_up
 from jaxident.diagnosis.causes.corrector import Term
 from jaxident.diagnosis.causes.which import Candidate
 from jaxident.diagnosis.noise.law import Law
+from jaxident.diagnosis.simulator import Simulator
 from jaxident.diagnosis.verdict import alike, judge, slip_of_drive, unknown_probability
 
 NONE: dict[str, float] = {}
@@ -74,7 +75,7 @@ def test_frames_that_lie_are_an_effect_by_themselves():
 
 
 def test_what_the_simulator_has_too_is_no_gap():
-    found = judge(finding({("slope",): 500.0}, ("slope",)), GAP, NONE, ("slope",))
+    found = judge(finding({("slope",): 500.0}, ("slope",)), GAP, NONE, Simulator(np.zeros(3), ("slope",)))
     assert found.none > 0.99
 
 

@@ -27,7 +27,8 @@ million times (chi-squared at 26), if the noise law is right; the rest is room f
 FORM = 0.01
 """Part of all that is explained which every further effect must bring: a robot's own form of an effect is never quite
 that of the catalogue, and what it leaves looks like another one."""
-MOST_EFFECTS = 3
+MOST_EFFECTS, BESIDE = 3, 4
+"""Effects in a set at most, and how many are refitted beside a set before one is accepted."""
 LIKELY = 1.0
 """Gain for which slip enters the law that the gap is held against: a floor without slip that is as likely there as not
 would be too low, and too sure."""
@@ -149,15 +150,28 @@ def _grow(found: dict, data: Data, without: Collection[str]) -> tuple[str, ...]:
         selected = singles[0].effects
     while selected and len(selected) < MOST_EFFECTS:
         now = found[selected]
-        scores = _scores(data, now.solution, without)
-        names = [n for n in _ranked(scores) if n not in selected and scores[n] > ENOUGH][:4]
-        _try(found, data, now.solution, names, selected)
+        _one_more(found, data, selected, without)
         more = [c for e, c in found.items() if len(e) == len(selected) + 1]
         best = max(more, key=lambda c: c.evidence, default=None)
         if best is None or best.evidence < now.evidence + ENOUGH:
             break
         selected = best.effects
     return selected
+
+
+def _one_more(found: dict, data: Data, selected: tuple[str, ...], without: Collection[str]) -> None:
+    """Refit the effects that a set leaves most room for, each beside it."""
+    solution = found[selected].solution
+    scores = _scores(data, solution, without)
+    names = [n for n in _ranked(scores) if n not in selected and scores[n] > ENOUGH][:BESIDE]
+    _try(found, data, solution, names, selected)
+
+
+def one_more(finding: Finding, selected: tuple[str, ...]) -> Finding:
+    """The search with sets of one effect more than some set of it."""
+    found = dict(finding.candidates)
+    _one_more(found, finding.data, selected, ())
+    return finding._replace(candidates=found)
 
 
 def _exchange(found: dict, data: Data, selected: tuple[str, ...], without: Collection[str]) -> tuple[str, ...]:

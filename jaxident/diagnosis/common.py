@@ -1,0 +1,129 @@
+"""What robot and simulator have in common, found by explaining both together: only what differs has a price of its own.
+
+Searched apart, two robots with the same unexplained gap make up different effects for it, which then look like
+differences.
+"""
+
+from collections.abc import Collection
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxident.diagnosis.causes.search import refit
+from jaxident.diagnosis.causes.unexplained import unexplained
+from jaxident.diagnosis.causes.which import ENOUGH, PENALTY, Candidate, Finding, one_more
+from jaxident.diagnosis.motion.coordinates import COORDINATES, NOMINAL, PLACES, free_places, neutral_vector
+from jaxident.diagnosis.motion.responses import respond
+
+BEST = 4
+"""Sets of either search that are tried on the other's logs as well."""
+MOSTLY = 0.7
+"""Part of an effect's size beyond which a difference of sizes is told as the effect, below as a parameter."""
+
+
+class Together(NamedTuple):
+    """Both searches with the sets selected that explain them best together; and for each set of the robot its value,
+    the evidence of both, and what of it the simulator has not, or hardly."""
+
+    robot: Finding
+    simulator: Finding
+    values: dict[tuple[str, ...], tuple[float, tuple[str, ...]]]
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """What of the robot's selected set the simulator has not, or hardly."""
+        return self.values[self.robot.selected][1]
+
+
+def explain_together(robot: Finding, simulator: Finding) -> Together:
+    """The pair of sets, one for the robot and one for the simulator, with the highest evidence in all.
+
+    An effect of both is paid for once; one of either alone must be worth more than ENOUGH, and more than terms that no
+    effect explains bring in both: as much is made up easily where something is missing that both have. Effects of both
+    take no room: each side is searched once more for another beside them.
+    """
+    price = max(ENOUGH, min(_largest_term(robot), _largest_term(simulator)))
+    theirs, own = _best(simulator), _best(robot)
+    robot, simulator = _with_sets(robot, theirs, simulator), _with_sets(simulator, own, robot)
+    chosen, partner, _ = _pair(robot, simulator, price)
+    robot, simulator = one_more(robot, chosen), one_more(simulator, partner)
+    chosen, partner, values = _pair(robot, simulator, price)
+    return Together(_reselected(robot, chosen), _reselected(simulator, partner), values)
+
+
+def _pair(
+    robot: Finding, simulator: Finding, price: float
+) -> tuple[tuple[str, ...], tuple[str, ...], dict[tuple[str, ...], tuple[float, tuple[str, ...]]]]:
+    """The best set of the robot and the simulator's beside it, and the values of all of the robot's sets."""
+    values: dict[tuple[str, ...], tuple[float, tuple[str, ...]]] = {}
+    partner: dict[tuple[str, ...], tuple[str, ...]] = {}
+    for effects, candidate in robot.candidates.items():
+        pairs = {
+            other: candidate.evidence + fit.evidence + shared_worth(effects, other, price)
+            for other, fit in simulator.candidates.items()
+        }
+        partner[effects] = max(pairs, key=lambda other: pairs[other])
+        fit = simulator.candidates[partner[effects]]
+        missing = tuple(name for name in effects if name not in fit.effects or apart(name, candidate, fit, price))
+        values[effects] = pairs[partner[effects]], missing
+    chosen = max(values, key=lambda effects: values[effects][0])
+    return chosen, partner[chosen], values
+
+
+def shared_worth(own: Collection[str], theirs: Collection[str], price: float) -> float:
+    """What is added to the evidence of two sets: coordinates of effects in both are paid for once, every effect costs
+    ENOUGH as in a search alone, and one that only one of them has the price of a difference."""
+    both, either = set(own) & set(theirs), set(own) | set(theirs)
+    saved = PENALTY * sum(len(COORDINATES[name]) for name in both)
+    return saved - ENOUGH * len(both) - price * len(either - both)
+
+
+def apart(name: str, one: Candidate, other: Candidate, price: float) -> bool:
+    """Whether one of two fits has hardly any of an effect that the other has: taking one size for both would cost more
+    than `price` of -log p, and most of the larger size lies between them."""
+    sizes, parts = [], []
+    for fit in (one, other):
+        solution = fit.solution
+        places = [PLACES[name, coordinate.name] for coordinate in COORDINATES[name]]
+        own = [solution.places.index(place) for place in places if place in solution.places]
+        free = [place for place in places if place in solution.places]
+        neutral = neutral_vector(solution.vector[: len(NOMINAL)])
+        sizes.append(solution.vector[free] - neutral[free])
+        parts.append(solution.covariance[np.ix_(own, own)])
+    if sizes[0].shape != sizes[1].shape:
+        return False
+    weight = np.linalg.pinv(parts[0] + parts[1])
+    between, first, second = (float(step @ weight @ step) for step in (sizes[0] - sizes[1], *sizes))
+    return 0.5 * between > price and between > MOSTLY**2 * max(first, second)
+
+
+def _largest_term(finding: Finding) -> float:
+    return max((gain for _, gain in finding.terms), default=0.0)
+
+
+def _best(finding: Finding) -> list[tuple[str, ...]]:
+    order = sorted(finding.candidates, key=lambda effects: -finding.candidates[effects].evidence)
+    return list(dict.fromkeys([finding.selected, *order[:BEST]]))
+
+
+def _with_sets(finding: Finding, sets: list[tuple[str, ...]], other: Finding) -> Finding:
+    """With these sets refitted too, their effects begun where the other search has them."""
+    found = dict(finding.candidates)
+    for effects in sets:
+        if not any(set(effects) == set(known) for known in found):
+            vector = np.array(finding.nominal.vector)
+            places = free_places(effects)[len(NOMINAL) :]
+            vector[places] = other.candidates[effects].solution.vector[places]
+            solution = refit(finding.data, vector, finding.nominal.starts, effects)
+            found[effects] = Candidate(effects, solution, finding.nominal.cost - solution.cost)
+    return finding._replace(candidates=found)
+
+
+def _reselected(finding: Finding, selected: tuple[str, ...]) -> Finding:
+    """With another set selected, and what that one leaves unexplained."""
+    if selected == finding.selected:
+        return finding
+    solution, windows = finding.candidates[selected].solution, finding.data.windows
+    responses = respond(np.exp(solution.vector[:2]), solution.linear.residual, windows)
+    terms, law = unexplained(finding.data, solution, responses, finding.likely, sized=True)
+    return finding._replace(law=law, selected=selected, terms=terms)

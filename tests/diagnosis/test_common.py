@@ -1,0 +1,82 @@
+"""Which sets explain robot and simulator together, from candidates that are made up."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from support.diagnoses import made_up
+
+from jaxident.diagnosis import common
+from jaxident.diagnosis.causes.corrector import Term
+from jaxident.diagnosis.causes.search import Solution
+from jaxident.diagnosis.causes.which import Candidate
+from jaxident.diagnosis.common import apart, explain_together, shared_worth
+from jaxident.diagnosis.motion.coordinates import free_places, neutral_vector
+
+TERM = Term("drive", "v^3 in the acceleration along")
+PRICE = 9.0
+
+
+def fit(effects, size=0.0, deviation=0.01, gain=0.0):
+    """A candidate with every coordinate of its effects `size` away from neutral."""
+    vector, places = neutral_vector(np.ones(10)), free_places(effects)
+    vector[places[10:]] += size
+    covariance = deviation**2 * np.eye(len(places))
+    return Candidate(effects, Solution(vector, None, places, None, 0.0, covariance, 1), gain)
+
+
+def search(gains, selected, term=0.0):
+    """A search with candidates of some gains, all effects of size 0.1, and a term that it leaves unexplained."""
+    candidates = {effects: fit(effects, 0.1, gain=gain) for effects, gain in {(): 0.0, **gains}.items()}
+    use = SimpleNamespace(use=np.ones(10, bool), windows=None)
+    found = made_up("effects").finding._replace(candidates=candidates, selected=selected, data=use)
+    return found._replace(terms=[(TERM, term)] if term else [])
+
+
+@pytest.fixture
+def together(monkeypatch):
+    """Robot and simulator explained by the sets that they have; nothing is refitted."""
+    monkeypatch.setattr(common, "one_more", lambda finding, selected: finding)
+    monkeypatch.setattr(common, "_with_sets", lambda finding, sets, other: finding)
+    monkeypatch.setattr(common, "_reselected", lambda finding, selected: finding._replace(selected=selected))
+    return explain_together
+
+
+def test_what_the_robot_has_alone_is_missing(together):
+    robot = search({("slope",): 400.0, ("turn_loss",): 100.0, ("turn_loss", "slope"): 600.0}, ("turn_loss", "slope"))
+    found = together(robot, search({("turn_loss",): 200.0, ("slope",): 5.0}, ("turn_loss",)))
+    assert found.robot.selected == ("turn_loss", "slope")
+    assert found.simulator.selected == ("turn_loss",)
+    assert found.missing == ("slope",)
+
+
+def test_the_same_gap_made_up_differently_is_no_difference(together):
+    """Each alone takes another set; with one effect for both the evidence falls less than two differences cost."""
+    robot = search({("turn_loss",): 300.0, ("mass_offset",): 290.0}, ("turn_loss",))
+    simulator = search({("mass_offset",): 200.0, ("turn_loss",): 190.0}, ("mass_offset",))
+    found = together(robot, simulator)
+    assert found.robot.selected == found.simulator.selected
+    assert found.missing == ()
+
+
+def test_a_difference_must_be_worth_more_than_what_both_leave_unexplained(together):
+    def missing(term):
+        robot = search({("turn_loss",): 300.0, ("turn_loss", "slope"): 360.0}, ("turn_loss", "slope"), term)
+        return together(robot, search({("turn_loss",): 200.0}, ("turn_loss",), 100.0)).missing
+
+    assert missing(term=0.0) == ("slope",), "the robot alone leaves nothing"
+    assert missing(term=80.0) == ()
+
+
+def test_an_effect_of_both_is_paid_for_once():
+    assert shared_worth(("slope",), (), PRICE) == -PRICE
+    assert shared_worth(("slope",), ("slope",), PRICE) == 4.0 * 2 - 9.0  # two coordinates, and to be claimed
+
+
+def test_the_same_effect_of_another_size_is_a_parameter_and_hardly_any_of_it_a_difference():
+    large, half, little = (fit(("transport_delay",), size) for size in (0.1, 0.06, 0.02))
+    assert not apart("transport_delay", large, large, PRICE)
+    assert not apart("transport_delay", large, half, PRICE)
+    assert apart("transport_delay", large, little, PRICE)
+    unsure = fit(("transport_delay",), 0.02, deviation=0.05)
+    assert not apart("transport_delay", large, unsure, PRICE), "a common size costs hardly anything"
