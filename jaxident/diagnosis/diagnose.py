@@ -12,7 +12,7 @@ from jaxident.diagnosis.extent.where import Place
 from jaxident.diagnosis.prepare import Prepared, prepare
 from jaxident.diagnosis.repair import search
 from jaxident.diagnosis.replay import Replay, answers, replay, visible
-from jaxident.diagnosis.simulator import as_simulator, check_units, inspect_simulator, shared
+from jaxident.diagnosis.simulator import Simulator, as_simulator, check_units, inspect_simulator, shared
 from jaxident.diagnosis.verdict import Judgement, judge
 from jaxident.errors import InputError
 from jaxident.log import Log
@@ -54,6 +54,7 @@ class Diagnosis(NamedTuple):
     prepared: Prepared
     finding: Finding
     surplus: tuple[str, ...] = ()
+    simulator: Simulator | None = None
 
     @property
     def not_testable(self) -> list[str]:
@@ -98,7 +99,7 @@ def diagnose(
     nominal = translate.to_model(prepared, finding.nominal, finding.law, ())
     return Diagnosis(verdict, judgement, gap, where, selected if verdict == "effects" else (), parameters,
                      visible(known), replay(known, seed), advice(verdict, judgement), nominal, corrected, shrinks,
-                     prepared, finding, surplus)  # fmt: skip
+                     prepared, finding, surplus, simulator)  # fmt: skip
 
 
 def check_nominal(logs: Log | Sequence[Log], sim: Log | Sequence[Log] | None, model: Model | None) -> None:

@@ -9,7 +9,7 @@ from jaxident.diagnosis.causes.which import ENOUGH, PENALTY, Candidate
 from jaxident.diagnosis.diagnose import Diagnosis
 from jaxident.diagnosis.motion.coordinates import COORDINATES
 from jaxident.diagnosis.replay import DRAWS, FAINT, Replay
-from jaxident.diagnosis.verdict import BELIEVABLE, EXCESS, excess_of, slip_of_drive
+from jaxident.diagnosis.verdict import EXCESS, believable_slip, excess_of, rest_of, slip_of_drive
 from jaxident.diagnosis.visible import smallest_sizes
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.report.page import Figure, Section, Table
@@ -116,6 +116,9 @@ def _unexplained(found: Diagnosis) -> list[str | Table]:
         f"would explain more, {percent(rest / max(gained + rest, 1e-9))} of all that can be explained. Commands, and "
         "so the words small and large, are over the largest one."
     )
+    if found.simulator is not None and found.simulator.finding is not None:
+        own = rest_of(found.finding, found.simulator)[0] / max(rest, 1e-9)
+        text += f" Of that, {percent(own)} is beyond what the simulator's logs leave unexplained as well."
     table = Table(("term", "site", "gain"), rows, "They are no effects by name; they say where to look.")
     return [text, table, *_beyond_words(found)]
 
@@ -130,7 +133,7 @@ def _beyond_words(found: Diagnosis) -> list[str]:
     if excess > EXCESS:
         words.append(f"Stretches that took no part in any fit are predicted {number(excess)} times worse than noise "
                      "allows, at the least.")  # fmt: skip
-    if slip > BELIEVABLE:
+    if slip > believable_slip(found.simulator):
         words.append(f"What is left looks like random slip of {percent(slip)} of full drive: more than wheels slip "
                      "without a cause.")  # fmt: skip
     return words
