@@ -17,17 +17,20 @@ from jaxident.diagnosis.motion.responses import respond
 
 BEST = 4
 """Sets of either search that are tried on the other's logs as well."""
+TERMS = 2.0
+"""Terms that no effect explains, the largest in both, that one effect may take up: a difference is worth more."""
 MOSTLY = 0.7
 """Part of an effect's size beyond which a difference of sizes is told as the effect, below as a parameter."""
 
 
 class Together(NamedTuple):
     """Both searches with the sets selected that explain them best together; and for each set of the robot its value,
-    the evidence of both, and what of it the simulator has not, or hardly."""
+    the evidence of both, and what of it the simulator has not, or hardly. price: what a difference must be worth."""
 
     robot: Finding
     simulator: Finding
     values: dict[tuple[str, ...], tuple[float, tuple[str, ...]]]
+    price: float
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -38,17 +41,17 @@ class Together(NamedTuple):
 def explain_together(robot: Finding, simulator: Finding) -> Together:
     """The pair of sets, one for the robot and one for the simulator, with the highest evidence in all.
 
-    An effect of both is paid for once; one of either alone must be worth more than ENOUGH, and more than terms that no
-    effect explains bring in both: as much is made up easily where something is missing that both have. Effects of both
-    take no room: each side is searched once more for another beside them.
+    An effect of both is paid for once; one of either alone must be worth more than ENOUGH, and more than TERMS terms
+    that no effect explains bring in both: as much is made up easily where something is missing that both have. Effects
+    of both take no room: each side is searched once more for another beside them.
     """
-    price = max(ENOUGH, min(_largest_term(robot), _largest_term(simulator)))
+    price = max(ENOUGH, TERMS * min(_largest_term(robot), _largest_term(simulator)))
     theirs, own = _best(simulator), _best(robot)
     robot, simulator = _with_sets(robot, theirs, simulator), _with_sets(simulator, own, robot)
     chosen, partner, _ = _pair(robot, simulator, price)
     robot, simulator = one_more(robot, chosen), one_more(simulator, partner)
     chosen, partner, values = _pair(robot, simulator, price)
-    return Together(_reselected(robot, chosen), _reselected(simulator, partner), values)
+    return Together(_reselected(robot, chosen), _reselected(simulator, partner), values, price)
 
 
 def _pair(

@@ -85,7 +85,7 @@ def diagnose(
     if sim is not None:
         simulator, finding, values = inspect_simulator(sim, prepared, finding)
     told = None if simulator is None else simulator.vector
-    extra = direct_evidence(prepared, finding)
+    extra = direct_evidence(prepared, finding, ENOUGH if simulator is None else simulator.price)
     present = (*finding.selected, *(name for name, evidence in extra.items() if evidence > ENOUGH))
     common, surplus = shared(present, simulator)
     selected = tuple(name for name in present if name not in common)

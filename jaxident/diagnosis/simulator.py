@@ -28,11 +28,12 @@ UNITS = 15.0
 
 class Simulator(NamedTuple):
     """What the user's simulator is: vector (SIZE,) of its nominal parameters and effects, and their names; the search
-    of its logs, None for a model."""
+    of its logs, None for a model; what a difference between it and the robot must be worth."""
 
     vector: Any
     effects: tuple[str, ...]
     finding: Finding | None = None
+    price: float = ENOUGH
 
 
 def check_units(sim: Log | Sequence[Log], logs: Log | Sequence[Log]) -> None:
@@ -72,7 +73,8 @@ def inspect_simulator(
     together = explain_together(finding, found)
     fit = together.simulator.candidates[together.simulator.selected]
     effects = tuple(name for name in fit.effects if name not in together.missing)
-    return Simulator(fit.solution.vector, (*effects, *direct), together.simulator), together.robot, together.values
+    simulator = Simulator(fit.solution.vector, (*effects, *direct), together.simulator, together.price)
+    return simulator, together.robot, together.values
 
 
 def _search(sim: Log | Sequence[Log], prepared: Prepared, finding: Finding) -> tuple[Prepared, Finding]:
