@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxident.diagnosis.causes.direct import direct_evidence
+from jaxident.diagnosis.causes.direct import direct_effects, direct_evidence
 from jaxident.diagnosis.causes.which import ENOUGH, Finding, search_effects
-from jaxident.diagnosis.common import explain_together
+from jaxident.diagnosis.common import MOSTLY, explain_together
 from jaxident.diagnosis.noise.law import Law, first_law
 from jaxident.diagnosis.prepare import Prepared, prepare
 from jaxident.diagnosis.repair import search
@@ -69,12 +69,20 @@ def inspect_simulator(
     """The simulator behind some logs; the robot's search with the set selected that explains both best together; and
     what `judge` takes for the values of sets."""
     own, found = _search(sim, prepared, finding)
-    direct = tuple(name for name, worth in direct_evidence(own, found).items() if worth > ENOUGH)
     together = explain_together(finding, found)
     fit = together.simulator.candidates[together.simulator.selected]
-    effects = tuple(name for name in fit.effects if name not in together.missing)
-    simulator = Simulator(fit.solution.vector, (*effects, *direct), together.simulator, together.price)
+    shared_effects = tuple(name for name in fit.effects if name not in together.missing)
+    direct = tuple(name for name, worth in direct_evidence(own, found).items() if worth > ENOUGH)
+    rare = rarer(direct_effects(own, found, direct), direct_effects(prepared, finding, direct))
+    effects = (*shared_effects, *(name for name in direct if name not in rare))
+    simulator = Simulator(fit.solution.vector, effects, together.simulator, together.price)
     return simulator, together.robot, together.values
+
+
+def rarer(theirs: dict[str, dict[str, float]], own: dict[str, dict[str, float]]) -> list[str]:
+    """Effects of chance that a simulator has hardly any of: most of the robot's share of rows is missing there."""
+    shares = {name: values["probability"] for name, values in own.items() if "probability" in values}
+    return [name for name, share in shares.items() if theirs[name]["probability"] < (1.0 - MOSTLY) * share]
 
 
 def _search(sim: Log | Sequence[Log], prepared: Prepared, finding: Finding) -> tuple[Prepared, Finding]:

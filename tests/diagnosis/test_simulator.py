@@ -7,7 +7,7 @@ import pytest
 
 from jaxident.diagnosis.diagnose import compare_parameters
 from jaxident.diagnosis.motion.coordinates import PLACES, neutral_vector
-from jaxident.diagnosis.simulator import Simulator, as_simulator, check_units, shared
+from jaxident.diagnosis.simulator import Simulator, as_simulator, check_units, rarer, shared
 from jaxident.errors import InputError
 from jaxident.log import make_log
 from jaxident.robot.drive import Physical
@@ -82,3 +82,18 @@ def test_the_right_effect_of_the_wrong_size_is_a_parameter():
     assert last.name == "transport_delay delay"
     np.testing.assert_allclose(last[1:], [0.05, 0.10, 0.01], rtol=1e-6)
     assert len(compare_parameters(prepared, finding, given)) == 10
+
+
+def test_what_the_simulator_has_hardly_any_of_is_rarer_there():
+    theirs = {
+        "outliers": {"probability": 0.001},
+        "frozen_frames": {"probability": 0.05},
+        "coloured_noise": {"position": 1.0},
+    }
+    own = {
+        "outliers": {"probability": 0.02},
+        "frozen_frames": {"probability": 0.08},
+        "coloured_noise": {"position": 2.0},
+    }
+    assert rarer(theirs, own) == ["outliers"]
+    assert rarer(theirs, {}) == []
