@@ -22,14 +22,17 @@ TERMS = 2.0
 MOSTLY = 0.7
 """Part of an effect's size beyond which a difference of sizes is told as the effect, below as a parameter."""
 
+Values = dict[tuple[str, ...], tuple[float, tuple[str, ...]]]
+"""Of each set of the robot its value, the evidence of both, and what of it the simulator has not, or hardly."""
+
 
 class Together(NamedTuple):
-    """Both searches with the sets selected that explain them best together; and for each set of the robot its value,
-    the evidence of both, and what of it the simulator has not, or hardly. price: what a difference must be worth."""
+    """Both searches with the sets selected that explain them best together; the values of all of the robot's sets;
+    what a difference must be worth."""
 
     robot: Finding
     simulator: Finding
-    values: dict[tuple[str, ...], tuple[float, tuple[str, ...]]]
+    values: Values
     price: float
 
     @property
@@ -54,11 +57,9 @@ def explain_together(robot: Finding, simulator: Finding) -> Together:
     return Together(_reselected(robot, chosen), _reselected(simulator, partner), values, price)
 
 
-def _pair(
-    robot: Finding, simulator: Finding, price: float
-) -> tuple[tuple[str, ...], tuple[str, ...], dict[tuple[str, ...], tuple[float, tuple[str, ...]]]]:
+def _pair(robot: Finding, simulator: Finding, price: float) -> tuple[tuple[str, ...], tuple[str, ...], Values]:
     """The best set of the robot and the simulator's beside it, and the values of all of the robot's sets."""
-    values: dict[tuple[str, ...], tuple[float, tuple[str, ...]]] = {}
+    values: Values = {}
     partner: dict[tuple[str, ...], tuple[str, ...]] = {}
     for effects, candidate in robot.candidates.items():
         pairs = {

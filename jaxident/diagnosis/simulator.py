@@ -7,7 +7,7 @@ import numpy as np
 
 from jaxident.diagnosis.causes.direct import direct_effects, direct_evidence
 from jaxident.diagnosis.causes.which import ENOUGH, Finding, search_effects
-from jaxident.diagnosis.common import MOSTLY, explain_together
+from jaxident.diagnosis.common import MOSTLY, Values, explain_together
 from jaxident.diagnosis.noise.law import Law, first_law
 from jaxident.diagnosis.prepare import Prepared, prepare
 from jaxident.diagnosis.repair import search
@@ -65,7 +65,7 @@ def _answers(log: Log) -> tuple[float, float]:
 
 def inspect_simulator(
     sim: Log | Sequence[Log], prepared: Prepared, finding: Finding
-) -> tuple[Simulator, Finding, dict[tuple[str, ...], tuple[float, tuple[str, ...]]]]:
+) -> tuple[Simulator, Finding, Values]:
     """The simulator behind some logs; the robot's search with the set selected that explains both best together; and
     what `judge` takes for the values of sets."""
     own, found = _search(sim, prepared, finding)

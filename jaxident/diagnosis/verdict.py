@@ -6,6 +6,7 @@ import numpy as np
 
 from jaxident.diagnosis.causes.unexplained import UNEXPLAINED
 from jaxident.diagnosis.causes.which import ENOUGH, Finding
+from jaxident.diagnosis.common import Values
 from jaxident.diagnosis.extent.measure import Gap
 from jaxident.diagnosis.extent.shrink import interval
 from jaxident.diagnosis.simulator import Simulator
@@ -57,7 +58,7 @@ def judge(
     gap: Gap,
     extra: dict[str, float],
     simulator: Simulator | None = None,
-    values: dict[tuple[str, ...], tuple[float, tuple[str, ...]]] | None = None,
+    values: Values | None = None,
 ) -> Judgement:
     """Probabilities from the candidates, from what they leave unexplained, and from effects found directly in the
     frames or in the noise law (`extra`: name to evidence). What the simulator has already is no gap. values: of every
