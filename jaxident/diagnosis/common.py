@@ -86,16 +86,13 @@ def apart(name: str, one: Candidate, other: Candidate, price: float) -> bool:
     """Whether one of two fits has hardly any of an effect that the other has: taking one size for both would cost more
     than `price` of -log p, and most of the larger size lies between them."""
     sizes, parts = [], []
-    for fit in (one, other):
-        solution = fit.solution
-        places = [PLACES[name, coordinate.name] for coordinate in COORDINATES[name]]
-        own = [solution.places.index(place) for place in places if place in solution.places]
-        free = [place for place in places if place in solution.places]
-        neutral = neutral_vector(solution.vector[: len(NOMINAL)])
-        sizes.append(solution.vector[free] - neutral[free])
+    for solution in (one.solution, other.solution):
+        own = [
+            k for k, place in enumerate(solution.places) if place in {PLACES[name, c.name] for c in COORDINATES[name]}
+        ]
+        free = [solution.places[k] for k in own]
+        sizes.append(solution.vector[free] - neutral_vector(solution.vector[: len(NOMINAL)])[free])
         parts.append(solution.covariance[np.ix_(own, own)])
-    if sizes[0].shape != sizes[1].shape:
-        return False
     weight = np.linalg.pinv(parts[0] + parts[1])
     between, first, second = (float(step @ weight @ step) for step in (sizes[0] - sizes[1], *sizes))
     return 0.5 * between > price and between > MOSTLY**2 * max(first, second)

@@ -23,6 +23,8 @@ EXCESS = 2.0
 is this many times what noise could make it at most."""
 BELIEVABLE = 0.025
 """Random slip beyond this part of full drive, at a correlation time of SLOW [s], is a cause nobody has found yet."""
+MORE = 2.0
+"""Times a simulator's slip that a robot's may be: two halves of one log of a real robot differ by up to 1.7."""
 SLOW = 0.2
 """Correlation time [s] at which slip is compared."""
 WIDTH = 0.12
@@ -91,30 +93,28 @@ def unknown_probability(finding: Finding, gap: Gap, simulator: Simulator | None 
     """How sure it is that something outside the selected set takes part: terms of the corrector explain more, runs that
     served nothing else are predicted worse than noise allows, or more is called slip than wheels slip. What a simulator
     leaves unexplained as well, or calls slip, is no difference between the two."""
-    rest, share = rest_of(finding, simulator)
+    rest = rest_of(finding, simulator)
     large = _logistic((rest - SIGNIFICANT) / SHARPNESS[1])
-    explained = large * _logistic((share - UNEXPLAINED) / SHARPNESS[0])
+    explained = large * _logistic((finding.share(rest) - UNEXPLAINED) / SHARPNESS[0])
     beyond = _beyond(excess_of(gap), EXCESS), _beyond(slip_of_drive(finding), believable_slip(simulator))
     return 1.0 - (1.0 - explained) * (1.0 - beyond[0]) * (1.0 - beyond[1])
 
 
-def rest_of(finding: Finding, simulator: Simulator | None = None) -> tuple[float, float]:
-    """What terms of the corrector explain, and its share of all that is explained; beyond what they explain of as many
-    windows of the simulator."""
-    rest = sum(gain for _, gain in finding.terms)
-    if simulator is not None and simulator.finding is not None:
-        other = simulator.finding
-        windows = float(np.sum(finding.data.use)) / max(float(np.sum(other.data.use)), 1.0)
-        rest = max(rest - windows * sum(gain for _, gain in other.terms), 0.0)
-    return rest, rest / max(finding.candidates[finding.selected].gain + rest, 1e-9)
+def rest_of(finding: Finding, simulator: Simulator | None = None) -> float:
+    """What terms of the corrector explain, beyond what they explain of as many windows of the simulator."""
+    if simulator is None or simulator.finding is None:
+        return finding.rest
+    other = simulator.finding
+    windows = float(np.sum(finding.data.use)) / max(float(np.sum(other.data.use)), 1.0)
+    return max(finding.rest - windows * other.rest, 0.0)
 
 
 def believable_slip(simulator: Simulator | None = None) -> float:
-    """Random slip, as a part of full drive, that no unknown cause is needed for: BELIEVABLE, or a simulator's own and
-    as much again."""
+    """Random slip, as a part of full drive, that no unknown cause is needed for: BELIEVABLE, or MORE times what a
+    simulator has itself."""
     if simulator is None or simulator.finding is None:
         return BELIEVABLE
-    return max(BELIEVABLE, 2.0 * slip_of_drive(simulator.finding))
+    return max(BELIEVABLE, MORE * slip_of_drive(simulator.finding))
 
 
 def excess_of(gap: Gap) -> float:
@@ -169,8 +169,7 @@ def alike(finding: Finding, name: str) -> tuple[str, ...]:
 def _sites(finding: Finding, sets, unknown: float) -> dict[str, float]:
     """Probability that each site takes part; an unknown cause lies where the corrector's terms do, and without any
     somewhere between motors and ground, as what cannot be told from slip does."""
-    rest = sum(gain for _, gain in finding.terms)
-    found = {}
+    rest, found = finding.rest, {}
     for site in SITES:
         known = sum(p for effects, p in sets if any(CATALOGUE[name].site == site for name in effects))
         lies = sum(gain for term, gain in finding.terms if term.site == site) / rest if rest else NOWHERE[site]

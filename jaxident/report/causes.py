@@ -109,15 +109,13 @@ def _unexplained(found: Diagnosis) -> list[str | Table]:
     if not terms:
         return [*_beyond_words(found), NO_TERMS]
     rows = [(term.name, term.site, float(gain)) for term, gain in terms]
-    rest = sum(gain for _, gain in terms)
-    gained = found.finding.candidates[found.finding.selected].gain
     text = (
         "What the best set of effects leaves unexplained: terms from a library of simple forces and camera errors that "
-        f"would explain more, {percent(rest / max(gained + rest, 1e-9))} of all that can be explained. Commands, and "
+        f"would explain more, {percent(found.finding.unexplained)} of all that can be explained. Commands, and "
         "so the words small and large, are over the largest one."
     )
     if found.simulator is not None and found.simulator.finding is not None:
-        own = rest_of(found.finding, found.simulator)[0] / max(rest, 1e-9)
+        own = rest_of(found.finding, found.simulator) / max(found.finding.rest, 1e-9)
         text += f" Of that, {percent(own)} is beyond what the simulator's logs leave unexplained as well."
     table = Table(("term", "site", "gain"), rows, "They are no effects by name; they say where to look.")
     return [text, table, *_beyond_words(found)]

@@ -97,3 +97,20 @@ def test_more_slip_than_wheels_have_is_unknown():
     found = judge(slipping(0.1), GAP, NONE)
     assert found.unknown > 0.95
     assert found.sites["drive"] + found.sites["contact"] > 0.7
+
+
+def test_what_the_simulator_leaves_unexplained_too_is_no_difference():
+    """The same rest and slip in as many windows of both: nothing unknown lies between them; alone it does."""
+    nominal = SimpleNamespace(vector=np.array([1.0, 1.5, 0.5, 0.5, 5.0, -5.0]))
+    term = (Term("drive", "v^3 in the acceleration along"), 400.0)
+
+    def both(part, rest):
+        law = Law(1e-3, 5e-3, (part, part * 10.0), 0.2)
+        data = SimpleNamespace(use=np.ones(10, bool))
+        return finding({("slope",): 300.0}, ("slope",), [(term[0], rest)])._replace(law=law, nominal=nominal, data=data)
+
+    robot = both(0.1, 400.0)
+    assert unknown_probability(robot, GAP) > 0.95
+    assert unknown_probability(robot, GAP, Simulator(np.zeros(3), (), both(0.1, 400.0))) < 0.05
+    assert unknown_probability(robot, GAP, Simulator(np.zeros(3), (), both(0.1, 40.0))) > 0.95, "terms"
+    assert unknown_probability(robot, GAP, Simulator(np.zeros(3), (), both(0.01, 400.0))) > 0.95, "slip"

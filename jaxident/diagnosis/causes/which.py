@@ -62,9 +62,17 @@ class Finding(NamedTuple):
     terms: list[tuple[Any, float]]
 
     @property
+    def rest(self) -> float:
+        """Fall of -log p that all terms bring beyond the selected set."""
+        return sum(gain for _, gain in self.terms)
+
+    @property
     def unexplained(self) -> float:
         """The terms' share of all that is explained."""
-        rest = sum(gain for _, gain in self.terms)
+        return self.share(self.rest)
+
+    def share(self, rest: float) -> float:
+        """Share of some rest in it and what the selected set explains."""
         return rest / max(self.candidates[self.selected].gain + rest, 1e-9)
 
 
