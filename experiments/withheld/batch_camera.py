@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from .batch_input import happens
+
 OUTSIDE = {"heading_bias": {"amplitude": 0.0, "phase": 0.0}}
 """A bias of the heading that turns with it, theta += a sin(theta - phase): a marker that is not flat."""
 
@@ -25,9 +27,10 @@ def mapped(effects, pose):
     bias = OUTSIDE["heading_bias"] | effects.get("heading_bias", {})
     theta = theta + bias["amplitude"] * np.sin(theta - bias["phase"])
     theta = theta + effects.get("heading_offset", {}).get("offset", 0.0)
-    lens = {"strength": 0.0, "centre_x": 0.0, "centre_y": 0.0} | effects.get("lens_distortion", {})
+    lens = {"strength": 0.0, "centre_x": 0.0, "centre_y": 0.0, "form": 0.0} | effects.get("lens_distortion", {})
     out_x, out_y = x - lens["centre_x"], y - lens["centre_y"]
-    stretch = lens["strength"] * (out_x**2 + out_y**2)
+    square = out_x**2 + out_y**2
+    stretch = lens["strength"] * (square**2 / lens["form"] if lens["form"] else square)
     x, y = x + stretch * out_x, y + stretch * out_y
     tilt = effects.get("camera_tilt", {"along_x": 0.0, "along_y": 0.0})
     depth = 1.0 + tilt["along_x"] * x + tilt["along_y"] * y
@@ -39,22 +42,28 @@ def disturbed(effects, period, seen, rng):
     """Correlated errors and outliers: (rows, 3)."""
     rows = len(seen)
     if "coloured_noise" in effects:
-        law = {"correlation_time": 0.5} | effects["coloured_noise"]
-        kept, error = np.exp(-period / law["correlation_time"]), rng.normal(size=(rows, 3))
+        law = {"correlation_time": 0.5, "form": 0.0} | effects["coloured_noise"]
+        kept, error = np.exp(-period / law["correlation_time"]), rng.normal(size=(rows, 3)) + 0j
+        turn = np.exp(2j * np.pi * law["form"] * period)  # the other form rings: a mast that sways
+        if law["form"]:
+            error = error + 1j * rng.normal(size=(rows, 3))
         for row in range(1, rows):
-            error[row] = kept * error[row - 1] + np.sqrt(1.0 - kept**2) * error[row]
-        seen = seen + error * [law["position"], law["position"], law["heading"]]
+            error[row] = kept * turn * error[row - 1] + np.sqrt(1.0 - kept**2) * error[row]
+        seen = seen + error.real * [law["position"], law["position"], law["heading"]]
     if "outliers" in effects:
         law = {"position": 0.05, "heading": 0.2} | effects["outliers"]
         hit = rng.random(rows) < law["probability"]
-        seen = seen + hit[:, None] * rng.normal(size=(rows, 3)) * [law["position"], law["position"], law["heading"]]
+        size = np.exp(law.get("form", 0.0) * rng.normal(size=(rows, 1))) if law.get("form") else 1.0
+        error = rng.normal(size=(rows, 3)) * size
+        seen = seen + hit[:, None] * error * [law["position"], law["position"], law["heading"]]
     return seen
 
 
 def frozen(effects, seen, rng):
     """Reported poses (rows, 3) with late frames repeated: the last step, after the white error."""
-    chance = effects.get("frozen_frames", {}).get("probability", 0.0)
-    if chance <= 0.0:
+    law = {"probability": 0.0, "form": 0.0} | effects.get("frozen_frames", {})
+    if law["probability"] <= 0.0:
         return seen
-    source = np.where(rng.random(len(seen)) < chance, 0, np.arange(len(seen)))
+    late = happens(rng, len(seen), law["probability"], law["form"])
+    source = np.where(late, 0, np.arange(len(seen)))
     return seen[np.maximum.accumulate(source)]

@@ -2,12 +2,14 @@
 
 Shares no code with the package. The forms are those of `jaxident effects`; the integrator is another: Runge-Kutta
 over substeps of held drive, and dry friction as an implicit projection (Moreau's time stepping) instead of events.
-`OUTSIDE` are effects that no catalogue lists.
+Most effects have another form as well, where their parameter `form` is not zero (`robots.FORMS`): a robot's drag need
+not be quadratic. `OUTSIDE` are effects that no catalogue lists.
 """
 
 import numpy as np
 
 from .batch_camera import report
+from .batch_input import arriving, delays, pair, pushed, sent_commands
 
 SUBSTEPS, RUBBING, SWEEPS = 16, 64, 8
 """Substeps per row, those of runs with dry friction, and sweeps over the two wheels' frictions."""
@@ -45,12 +47,16 @@ OUTSIDE: dict[str, dict[str, float]] = {
 }
 
 
+MEMORY = ("command", "play", "lag", "second lag", "friction", "angle", "heat")
+"""What a robot remembers of both wheels."""
+
+
 def columns(effects: list[dict]) -> dict[str, dict[str, np.ndarray]]:
     """Every parameter of every effect as an array (runs,), neutral where a run has not that effect."""
     return {
         name: {
             key: np.array([run.get(name, {}).get(key, neutral) for run in effects], float)
-            for key, neutral in parameters.items()
+            for key, neutral in {"form": 0.0, **parameters}.items()
         }
         for name, parameters in (NEUTRAL | OUTSIDE).items()
     }
@@ -68,15 +74,16 @@ def simulate(robots, effects, period, u, start, session_time, slip=None, rngs=No
     substeps = substeps or (RUBBING if rubs else SUBSTEPS)
     p, robot = columns(effects), stack(robots)
     sent = sent_commands(p, np.array(u, float), rngs)
+    delay = delays(p, period, len(sent), rngs)
     rows, runs = sent.shape[:2]
     h = np.asarray(period, float) / substeps
     state = np.concatenate([np.asarray(start, float).T, np.zeros((2, runs))])
-    memory = {key: np.zeros((runs, 2)) for key in ("command", "play", "lag", "friction", "angle", "heat")}
+    memory = {key: np.zeros((runs, 2)) for key in MEMORY}
     poses = np.zeros((rows, runs, 3))
     poses[0] = state[:3].T
     for row in range(rows - 1):
         shove = np.zeros((runs, 2)) if slip is None else slip[row]
-        targets = arriving(sent, row, p["transport_delay"]["delay"] / period, substeps)
+        targets = arriving(sent, row, delay[row], substeps)
         for j in range(substeps):
             time = session_time + row * period + (j + 0.5) * h
             drive = pushed(p, robot, memory, targets[j], time, h)
@@ -88,6 +95,7 @@ def simulate(robots, effects, period, u, start, session_time, slip=None, rngs=No
 def stack(robots) -> dict[str, np.ndarray]:
     """Parameters as arrays with a leading axis of runs, and the map from [v, w] to wheel speeds in command units."""
     robot = {key: np.array([each[key] for each in robots], float) for key in ("rate", "gain", "coupling", "dead_zone")}
+    robot["top"] = np.abs(robot["gain"]).sum(axis=2) / robot["rate"]
     robot["inverse"] = np.linalg.inv(robot["gain"])
     robot["to_n"] = robot["inverse"] * robot["rate"][:, None, :]
     robot["from_n"] = np.linalg.inv(robot["to_n"])
@@ -95,80 +103,9 @@ def stack(robots) -> dict[str, np.ndarray]:
     return robot
 
 
-def sent_commands(p, u, rngs):
-    """Commands (rows, runs, 2) that leave for the robot; an empty last row holds the one before."""
-    u[-1] = np.where(np.isnan(u[-1]), u[-2], u[-1])
-    level = p["input_saturation"]["level"][:, None]
-    u = np.clip(u, -level, level)
-    step = p["input_quantisation"]["step"][:, None]
-    u = np.where(step > 0, np.round(u / np.where(step > 0, step, 1.0)) * step, u)
-    for run in np.flatnonzero(p["lost_commands"]["probability"]) if rngs is not None else ():
-        lost = rngs[run].random(len(u)) < p["lost_commands"]["probability"][run]
-        u[:, run] = u[np.maximum.accumulate(np.where(lost, 0, np.arange(len(u)))), run]
-    return u
-
-
-def arriving(sent, row, delay, substeps):
-    """Mean of the delayed command over each substep of a row: (substeps, runs, 2); delay in rows (runs,)."""
-    if not np.any(delay > 0):
-        return np.broadcast_to(sent[row], (substeps, *sent[row].shape))
-    edges = row + np.arange(substeps + 1)[:, None] / substeps - delay
-    runs = np.arange(sent.shape[1])
-    first, last = np.floor(edges[:-1] + 1e-9).astype(int), np.floor(edges[1:] - 1e-9).astype(int)
-    early = np.where(first == last, 1.0, (last - edges[:-1]) * substeps)[..., None]
-
-    def at(index):
-        return np.where((index >= 0)[..., None], sent[np.maximum(index, 0), runs], 0.0)
-
-    return early * at(first) + (1.0 - early) * at(last)
-
-
-def pair(parameters):
-    """The two wheels' values as (runs, 2)."""
-    return np.stack([parameters["right"], parameters["left"]], axis=1)
-
-
-def pushed(p, robot, memory, target, time, h):
-    """What the motors give, mean over a substep: (runs, 2)."""
-    reach = (p["input_rate_limit"]["rate"] * h)[:, None]
-    before = memory["command"]
-    memory["command"] = np.where(np.isfinite(reach), before + np.clip(target - before, -reach, reach), target)
-    u = np.where(np.isfinite(reach), 0.5 * (before + memory["command"]), target)
-    width = np.maximum(robot["dead_zone"] + (p["dead_zone_drift"]["rate"] * time)[:, None], 0.0)
-    skew = pair(p["asymmetric_dead_zone"])
-    ahead, back = np.maximum(width + skew, 0.0), np.maximum(width - skew, 0.0)
-    m = np.where(u > ahead, u - ahead, np.where(u < -back, u + back, 0.0))
-    m = m + p["cubic_input"]["cube"][:, None] * m**3
-    m = m * (1.0 + pair(p["direction_gain"]) * np.sign(m))
-    m = m * np.maximum(1.0 + p["gain_drift"]["rate"] * time, 0.0)[:, None]
-    m = m / (1.0 + p["supply_sag"]["resistance"] * np.abs(u).sum(axis=1))[:, None]
-    m = m / (1.0 + p["motor_heating"]["loss"][:, None] * memory["heat"])
-    memory["heat"] = memory["heat"] + (m**2 - memory["heat"]) * (h / p["motor_heating"]["time_constant"])[:, None]
-    return lagged(p, memory, played(p, memory, m, h), h)
-
-
-def played(p, memory, m, h):
-    """What of the push arrives behind the play of the gears."""
-    half, h = 0.5 * pair(p["backlash"]), h[:, None]
-    left = np.maximum(half - np.sign(m) * memory["play"], 0.0)
-    free = np.clip(left / np.where(m == 0.0, 1.0, np.abs(m) * h), 0.0, 1.0)
-    memory["play"] = np.clip(memory["play"] + m * h, -half, half)
-    return np.where(half > 0.0, m * (1.0 - free), m)
-
-
-def lagged(p, memory, m, h):
-    """Mean over the substep of the first-order lag, whose end is kept."""
-    tau = p["motor_lag"]["time_constant"][:, None]
-    ratio = h[:, None] / np.where(tau > 0.0, tau, 1.0)
-    gap = memory["lag"] - m
-    mean = m + gap * -np.expm1(-ratio) / ratio
-    memory["lag"] = np.where(tau > 0.0, m + gap * np.exp(-ratio), m)
-    return np.where(tau > 0.0, mean, m)
-
-
 def substep(p, robot, memory, state, drive, shove, time, h):
     """State (5, runs) one substep later; the friction of the substep before is held, then corrected."""
-    light = np.where(time < p["payload_change"]["instant"], 1.0, 1.0 / p["payload_change"]["ratio"])
+    light = lightness(p["payload_change"], time)
     rub = np.einsum("nij,nj->ni", robot["gain"], memory["friction"]) * light[:, None]
 
     def slope(s):
@@ -188,9 +125,17 @@ def substep(p, robot, memory, state, drive, shove, time, h):
     return new
 
 
+def lightness(payload, time):
+    """Inverse of the robot's inertia (runs,), 1 at first; in the other form it changes at two instants."""
+    half = np.where(payload["form"] > 0, 0.5, 1.0)
+    loaded = half * (time >= payload["instant"]) + (1.0 - half) * (time >= payload["form"])
+    return payload["ratio"] ** -loaded
+
+
 def rubbed(p, robot, memory, state, new, light, h):
     """Speeds (2, runs) after dry friction: each wheel's force is within its level, and at the level where it slides."""
-    coulomb, static = pair(p["coulomb_friction"]), pair(p["stiction"])
+    hard = p["coulomb_friction"]["form"][:, None] == 0.0
+    coulomb, static = np.where(hard, pair(p["coulomb_friction"]), 0.0), pair(p["stiction"])
     if not np.any(coulomb + static > 0.0):
         return new[3:]
     mobility = robot["mobility"] * (light * h)[:, None, None]
@@ -198,7 +143,9 @@ def rubbed(p, robot, memory, state, new, light, h):
     free = np.einsum("nij,jn->ni", robot["to_n"], new[3:]) + np.einsum("nij,nj->ni", mobility, memory["friction"])
     force, n = memory["friction"].copy(), before
     for _ in range(2):  # the level at the speed before, then at the mean speed
-        level = coulomb + static * np.exp(-((0.5 * (before + n) / p["stiction"]["fade"][:, None]) ** 2))
+        part = np.abs(0.5 * (before + n)) / p["stiction"]["fade"][:, None]
+        straight = p["stiction"]["form"][:, None] > 0
+        level = coulomb + static * np.where(straight, np.maximum(1.0 - part, 0.0), np.exp(-(part**2)))
         for _ in range(SWEEPS):
             for wheel in range(2):
                 other = free[:, wheel] - mobility[:, wheel, 1 - wheel] * force[:, 1 - wheel]
@@ -221,18 +168,29 @@ def slopes(p, robot, memory, state, drive, light, push):
     limit = p["traction_limit"]["limit"][:, None]
     if np.any(np.isfinite(limit)):
         bound = np.where(np.isfinite(limit), limit, 1.0)
-        tyre = bound * np.tanh(np.einsum("nij,nj->ni", robot["inverse"], pull) / bound)
+        force = np.einsum("nij,nj->ni", robot["inverse"], pull)
+        sudden = p["traction_limit"]["form"][:, None] > 0
+        tyre = np.where(sudden, np.clip(force, -bound, bound), bound * np.tanh(force / bound))
         pull = np.where(np.isfinite(limit), np.einsum("nij,nj->ni", robot["gain"], tyre), pull)
     n = np.einsum("nij,jn->ni", robot["to_n"], state[3:])
-    pull = pull - np.einsum("nij,nj->ni", robot["gain"], p["cross_drag"]["drag"][:, None] * np.abs(n[:, ::-1]) * n)
+    soft = p["coulomb_friction"]["form"][:, None]
+    rub = np.where(soft > 0, pair(p["coulomb_friction"]) * np.tanh(n / np.where(soft > 0, soft, 1.0)), 0.0)
+    rub = rub + p["cross_drag"]["drag"][:, None] * np.abs(n[:, ::-1]) * n
+    pull = pull - np.einsum("nij,nj->ni", robot["gain"], rub)
     pull = pull * light[:, None] + push
     fall, patch = p["slope"], p["rough_patch"]
-    along = pull[:, 0] - p["quadratic_drag"]["along"] * v * np.abs(v) - p["turn_loss"]["loss"] * np.abs(w) * v
-    along = along + p["mass_offset"]["along"] * w * w + fall["acceleration"] * np.cos(theta - fall["direction"])
+    drag, loss, top = p["quadratic_drag"], p["turn_loss"], robot["top"].T
+    weak = np.where(drag["form"] > 0, np.sqrt(top / (np.abs(state[3:]) + 1e-9)), 1.0)  # a power of 1.5
+    turning = np.where(loss["form"] > 0, w * w / top[1], np.abs(w))
+    dished = 1.0 + fall["form"] * x
+    along = pull[:, 0] - drag["along"] * v * np.abs(v) * weak[0] - loss["loss"] * turning * v
+    along = along + p["mass_offset"]["along"] * w * w
+    along = along + fall["acceleration"] * dished * np.cos(theta - fall["direction"])
     along = along - patch["drag"] * v / (1.0 + np.exp(np.clip((patch["edge"] - x) / 0.01, -50, 50)))
     along = along - p["tether"]["pull"] * (x * cosine + y * sine)
-    heading = pull[:, 1] - p["quadratic_drag"]["heading"] * w * np.abs(w) - p["mass_offset"]["heading"] * v * w
-    side = -p["lateral_slip"]["slip"] * v * w
+    heading = pull[:, 1] - drag["heading"] * w * np.abs(w) * weak[1] - p["mass_offset"]["heading"] * v * w
+    most = 0.3 * top[0] * top[1]
+    side = np.where(p["lateral_slip"]["form"] > 0, most * np.tanh(v * w / most), v * w) * -p["lateral_slip"]["slip"]
     wobble = np.einsum("nij,nj->in", robot["from_n"], pair(p["wheel_eccentricity"]) * np.sin(memory["angle"]) * n)
     v, w = v + wobble[0], w + wobble[1]
     return np.stack([v * cosine - side * sine, v * sine + side * cosine, w, along, heading])

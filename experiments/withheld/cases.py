@@ -29,14 +29,19 @@ FORMAT = {
 }
 
 
-def describe(seed: int, kind: str, names: list[str], *, slip: bool, sim: str | None, inputs="multilevel") -> dict:
-    """One case of the batched generator; sim: None, `same` or `near`."""
+def describe(
+    seed: int, kind: str, names: list[str], *, slip: bool, sim: str | None, inputs="multilevel", other=False
+) -> dict:
+    """One case of the batched generator; sim: None, `same` or `near`; other: effects in another form, where they have
+    one, than the catalogue's."""
     rng = np.random.default_rng([seed, 1])
     robot, noise, period = robots.draw_robot(rng), robots.draw_noise(rng), float(rng.choice(robots.PERIODS))
     session, effects, strengths = RUNS * (ROWS - 1) * period, [], []
     for name in names:
         strengths.append(robots.draw_strength(rng))
         parameters = robots.draw_effect(rng, name, strengths[-1], robot, noise, session)
+        if other and name in robots.FORMS:
+            parameters["form"] = robots.form(name, parameters, session)
         effects.append({"name": name, "parameters": parameters, "sites": sites(name)})
     return {
         "generator": "batch",

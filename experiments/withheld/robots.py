@@ -194,6 +194,44 @@ LAWS = {
 }
 """Of every effect, in and outside the catalogue: (generator, strength, robot, noise, session) to parameters."""
 
+FORMS = {
+    "direction_gain": "the difference grows with the push",
+    "input_saturation": "tanh in place of a clip",
+    "input_quantisation": "rounded towards zero",
+    "input_rate_limit": "falls twice as fast as it rises",
+    "transport_delay": "every command waits 0.5 to 1.5 times as long",
+    "motor_lag": "two poles of half the time constant",
+    "backlash": "takes 70 % of the push",
+    "supply_sag": "with the squares of the commands",
+    "lost_commands": "three in a row",
+    "coulomb_friction": "tanh of the speed over 5 % of the fastest",
+    "stiction": "fades in a straight line",
+    "quadratic_drag": "with the power 1.5",
+    "turn_loss": "with the square of the turning",
+    "traction_limit": "clip in place of a tanh",
+    "lateral_slip": "levels off at 30 % of the largest v w",
+    "slope": "a floor that bends: twice as steep half a metre on",
+    "gain_drift": "with the square of the time",
+    "dead_zone_drift": "with the root of the time",
+    "payload_change": "in two halves, a tenth of the session apart",
+    "lens_distortion": "with the fourth power of the radius",
+    "coloured_noise": "rings at 0.5 Hz",
+    "outliers": "log-normal sizes",
+    "frozen_frames": "three in a row",
+}
+"""Effects that have another form than the catalogue's, and which."""
+
+
+def form(name: str, parameters: dict, session: float) -> float:
+    """The parameter `form` of an effect's other form, which holds its scale where it needs one."""
+    scales = {
+        "coulomb_friction": 0.05, "slope": 2.0, "gain_drift": session, "dead_zone_drift": session,
+        "payload_change": parameters.get("instant", 0.0) + 0.1 * session, "lens_distortion": 0.16,
+        "coloured_noise": 0.5,
+    }  # fmt: skip
+    return float(scales.get(name, 1.0))
+
+
 OUTSIDE_SITES = {
     "cubic_input": ("actuation",),
     "cross_drag": ("drive",),

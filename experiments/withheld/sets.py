@@ -5,17 +5,19 @@ import numpy as np
 from jaxident.effects import CATALOGUE
 
 from .cases import describe, simulate_cases
-from .robots import OUTSIDE_SITES
+from .robots import FORMS, OUTSIDE_SITES
 
 COUNTS = {
     "trial": {"none": 1, "single": 1, "pair": 1, "outside": 1},
     "development": {"none": 20, "single": 40},
     "development_pairs": {"pair": 15, "outside": 15},
+    "forms": {"single": 46, "pair": 30},
     "sealed": {"none": 80, "single": 145, "pair": 40, "outside": 40},
     "engine": {"none": 5, "single": 15},
     "sealed_engine": {"none": 20, "single": 60, "pair": 20},
 }
-"""Cases of each kind in each set; those of the engine need the extra `mujoco`."""
+"""Cases of each kind in each set; those of the engine need the extra `mujoco`. `forms`: effects in other forms than the
+catalogue's."""
 
 FORWARD = 0.06
 """Share of sealed cases whose input is two forward levels."""
@@ -52,14 +54,15 @@ def _engine_cases(rng, name: str) -> list[dict]:
 def _batch_cases(rng, name: str) -> list[dict]:
     cases = []
     for kind, count in COUNTS[name].items():
-        pool = list(OUTSIDE_SITES) if kind == "outside" else list(CATALOGUE)
+        listed = list(FORMS) if name == "forms" else list(CATALOGUE)
+        pool = list(OUTSIDE_SITES) if kind == "outside" else listed
         for number, names in enumerate(hidden_names(rng, kind, count, pool)):
             sim = rng.choice(["same", "near"]) if rng.random() < 1 / 3 else None
             slip = number % 2 == 1 if kind == "none" else rng.random() < 0.5
             forward = name == "sealed" and rng.random() < FORWARD
             inputs = "forward" if forward else "multilevel"
             own = int(rng.integers(2**62))
-            cases.append(describe(own, kind, names, slip=bool(slip), sim=sim, inputs=inputs))
+            cases.append(describe(own, kind, names, slip=bool(slip), sim=sim, inputs=inputs, other=name == "forms"))
     return cases
 
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from support.reference_effects import simulate_reference
 from withheld.batch_robot import NEUTRAL, OUTSIDE, simulate
+from withheld.robots import FORMS, form
 
 from jaxident.effects import CATALOGUE
 
@@ -58,3 +59,16 @@ def test_effects_outside_move_the_robot(together):
     sizes = {"cube": 0.3, "drag": 0.3, "right": 0.1, "turns": 30.0, "loss": 0.3, "pull": 0.3}
     moved = batch([{name: {key: sizes.get(key, value) for key, value in law.items()}} for name, law in OUTSIDE.items()])
     assert np.all(np.abs(moved - together[:, :1]).max(axis=(0, 2)) > 1e-3)
+
+
+def test_other_forms_are_other_and_alike():
+    """Every other form moves the robot apart from the catalogue's, by 1 % to ten times of what the effect does."""
+    mechanical = [name for name in FORMS if name in NEUTRAL and name != "lost_commands"]
+    effects = [{name: CATALOGUE[name].typical()} for name in mechanical]
+    others = [{name: own[name] | {"form": form(name, own[name], 4.0)}} for name, own in zip(mechanical, effects)]
+    rngs = [np.random.default_rng(k) for k in range(len(others))]
+    plain, usual, other = (batch(each, rngs=rngs) for each in ([{} for _ in others], effects, others))
+    apart = np.abs(other - usual).max(axis=(0, 2))
+    moved = np.abs(usual - plain).max(axis=(0, 2))
+    assert np.all(apart > 0.01 * moved), dict(zip(mechanical, apart / moved))
+    assert np.all(apart < 10.0 * moved), dict(zip(mechanical, apart / moved))
