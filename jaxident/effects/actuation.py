@@ -54,17 +54,19 @@ def supply_sag(m: Wheels, u: Wheels, resistance: Array) -> Wheels:
     return Wheels(m.right * share, m.left * share)
 
 
-def backlash(position: Array, m: Array, step: Array, width: Array) -> tuple[Array, Array]:
+def backlash(position: Array, turning: Array, step: Array, width: Array) -> tuple[Array, Array]:
     """New position in the play and the part of the step [0, 1] that passed before the gear drives again.
 
-    position in [-width / 2, width / 2] moves with p' = m while the wheel is free; the motor drives where p touches
-    the side towards which it turns. width in unit s: play in distance over the speed per unit of command.
+    position in [-width / 2, width / 2] moves with p' = turning = m - c n while the wheel is free; the motor drives
+    where p touches the side towards which it turns. c = 0: the wheel brakes meanwhile, as if on the motor's side, and
+    only a reversal of m opens the play. c = 1: the play lies between motor and wheel, n is the wheel's speed, and the
+    free wheel coasts, pushed by c n. width in unit s: play in distance over the speed per unit of command.
     """
     half = 0.5 * width
-    remaining = jnp.maximum(half - jnp.sign(m) * position, 0.0)
-    free = jnp.clip(safe_divide(remaining, jnp.abs(m) * step, 0.0), 0.0, 1.0)
+    remaining = jnp.maximum(half - jnp.sign(turning) * position, 0.0)
+    free = jnp.clip(safe_divide(remaining, jnp.abs(turning) * step, 0.0), 0.0, 1.0)
     loose = width > 0.0  # without play the bounds meet, and the derivative of a clip between them is arbitrary
-    return jnp.where(loose, jnp.clip(position + m * step, -half, half), 0.0), jnp.where(loose, free, 0.0)
+    return jnp.where(loose, jnp.clip(position + turning * step, -half, half), 0.0), jnp.where(loose, free, 0.0)
 
 
 def motor_lag(last: Array, m: Array, step: Array, time_constant: Array) -> tuple[Array, Array, Array, Array]:
@@ -112,8 +114,9 @@ ENTRIES = (
     _row("motor_lag", "q' = (m - q) / tau, gain q in place of gain m",
          (Parameter("time_constant", "s", 0.0, (0.0, 0.3), 0.06, least=0.0),), ("transport_delay",),
          "inductance and speed loop; Franklin, Powell, Emami-Naeini, ch. 2"),
-    _row("backlash", "after a reversal the motor turns freely until the integral of m is b",
-         _pair(f"{UNIT} s", 0.2, 0.05, least=0.0), ("transport_delay",),
+    _row("backlash", "p' = m - c n, |p| <= b / 2: where it touches neither side, c n in place of m",
+         (*_pair(f"{UNIT} s", 0.2, 0.05, least=0.0),
+          Parameter("coasting", "", 0.0, (0.0, 1.0), 0.0, least=0.0, most=1.0, shape=True)), ("transport_delay",),
          "Nordin, Gutman 2002, Controlling mechanical systems with backlash, Automatica 38", smooth=False,
          grid=(0.005, 0.01, 0.02, 0.05, 0.1, 0.2)),
     _row("supply_sag", "m -> m / (1 + s (|u_r| + |u_l|))",

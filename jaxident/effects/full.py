@@ -12,7 +12,7 @@ from jaxident.effects.actuation import input_quantisation, input_saturation, los
 from jaxident.effects.catalogue import CATALOGUE, by_name
 from jaxident.effects.input_chain import at_rest, push
 from jaxident.effects.intervals import Grid, make_grid
-from jaxident.effects.substep import ADDED, FRICTION, move, solve_half
+from jaxident.effects.substep import ADDED, FRICTION, Motion, after_half, move, solve_half, wheel_speeds
 from jaxident.robot.drive import Force, Physical, advance, force, hold
 from jaxident.robot.noise import Noise, correlated, draw_noise, observe, slip
 
@@ -130,7 +130,12 @@ def _scan(settings, drive, dead_zone, grid: Grid, slips: Force | None, start: St
     def interval(carry, now):
         state, memory = carry
         begin, h, target, shove, changed, solution = now
-        pushed, memory = push(settings, dead_zone, memory, target, begin, h)
+
+        def speeds(pushed: Wheels) -> Wheels:
+            midway = after_half(solution, Motion(state.v, state.w, state.theta), force(drive, pushed))
+            return wheel_speeds(drive, midway.v, midway.w)
+
+        pushed, memory = push(settings, dead_zone, memory, target, begin, h, speeds)
         if moving:
             after = move(settings, drive, state, pushed, shove, changed, solution, h)
         else:

@@ -6,6 +6,7 @@ Effects that are not in the settings are not computed.
 """
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -23,6 +24,9 @@ from jaxident.effects.time import dead_zone_drift, gain_drift
 
 NODES = (0.5 - math.sqrt(1.0 / 12.0), 0.5 + math.sqrt(1.0 / 12.0))
 """Gauss-Legendre rule on [0, 1] with two nodes of weight 1/2: mean and first moment of a cubic are exact."""
+
+
+Speeds = Callable[[Wheels], Wheels]
 
 
 class Memory(NamedTuple):
@@ -46,13 +50,16 @@ def at_rest(settings, like: Array) -> Memory:
     return Memory(*(Wheels(jnp.zeros_like(like), jnp.zeros_like(like)) if keep else None for keep in kept))
 
 
-def push(settings, dead_zone: Array, memory: Memory, target: Wheels, time: Array, step: Array) -> tuple[Push, Memory]:
-    """The push of a substep from session time `time` [s] on, `step` [s] long, and what is remembered after it."""
+def push(
+    settings, dead_zone: Array, memory: Memory, target: Wheels, time: Array, step: Array, speeds: Speeds
+) -> tuple[Push, Memory]:
+    """The push of a substep from session time `time` [s] on, `step` [s] long, and what is remembered after it. speeds:
+    those of the wheels half a substep on under some push, in commands that hold them, for play."""
     command, wheels = _before_play(settings, dead_zone, memory.command, target, time, step)
     play, lagged = memory.play, memory.lagged
     if "backlash" in settings:
-        widths = settings["backlash"]["right"], settings["backlash"]["left"]
-        driven = [_play(now, p, step, b) for now, p, b in zip(wheels, memory.play, widths, strict=True)]
+        driven = _plays(settings["backlash"], wheels, memory.play, step, speeds(Wheels(*(now.mean for now in wheels))))
+        driven = _plays(settings["backlash"], wheels, memory.play, step, speeds(Wheels(*(p.mean for p, _ in driven))))
         wheels, play = [now for now, _ in driven], Wheels(*(p for _, p in driven))
     if "motor_lag" in settings:
         time_constant = settings["motor_lag"]["time_constant"]
@@ -102,12 +109,19 @@ def _static(settings, dead_zone: Array, u: Wheels, time: Array) -> Wheels:
     return supply_sag(Wheels(*passed), u, settings["supply_sag"]["resistance"])
 
 
-def _play(now: Push, position: Array, step: Array, width: Array) -> tuple[Push, Array]:
-    """What passes the play: nothing for a first part of the substep."""
-    position, free = backlash(position, now.mean, step, width)
+def _plays(law, wheels: list[Push], positions: Wheels, step: Array, n: Wheels) -> list[tuple[Push, Array]]:
+    """What passes the play of both wheels, whose speeds are n, and their positions in it."""
+    sides = zip(wheels, positions, n, Wheels._fields, strict=True)
+    return [_play(now, place, step, law[side], law["coasting"] * own) for now, place, own, side in sides]
+
+
+def _play(now: Push, position: Array, step: Array, width: Array, coasting: Array) -> tuple[Push, Array]:
+    """What passes the play: for a first part of the substep no more than what lets the wheel coast."""
+    turning = now.mean - coasting
+    position, free = backlash(position, turning, step, width)
     driving = 1.0 - free
-    slope = 6.0 * free * driving * now.mean
-    return Push(driving * now.mean, slope if now.slope is None else slope + driving * now.slope), position
+    slope = 6.0 * free * driving * turning
+    return Push(coasting + driving * turning, slope if now.slope is None else slope + driving * now.slope), position
 
 
 def _lag(now: Push, last: Array, step: Array, time_constant: Array) -> tuple[Push, Array]:

@@ -78,7 +78,7 @@ def move(settings, drive: Physical, state: State, push: Push, slip: Force | None
 
 def _guess(departure, start: Motion, half: Half, h: Array) -> Motion:
     """The departure at the end of the substep if its rate stays what it is: what friction is first settled with."""
-    moved = _after(half, _after(half, departure(0.5, start)))
+    moved = after_half(half, after_half(half, departure(0.5, start)))
     return Motion(*(h * part for part in moved))
 
 
@@ -111,14 +111,14 @@ def _smooth(settings, v: Array, w: Array, theta: Array) -> list[Force]:
 
 def _runge_kutta(drive: Physical, departure, start: Motion, held: Force, half: Half, h: Array):
     """Rates of change of the departure at the start and the end of the substep, and the departure at its end."""
-    middle = _after(half, start, held)
-    end = _after(half, middle, held)
+    middle = after_half(half, start, held)
+    end = after_half(half, middle, held)
     k1 = departure(0.0, start)
-    carried = _after(half, k1)
+    carried = after_half(half, k1)
     k2 = departure(0.5, _sum(middle, (0.5 * h, carried)))
     k3 = departure(0.5, _sum(middle, (0.5 * h, k2)))
-    k4 = departure(1.0, _sum(end, (h, _after(half, k3))))
-    inner = _after(half, _sum(carried, (2.0, k2), (2.0, k3)))
+    k4 = departure(1.0, _sum(end, (h, after_half(half, k3))))
+    inner = after_half(half, _sum(carried, (2.0, k2), (2.0, k3)))
     d = Motion(*((h / 6.0) * (a + b) for a, b in zip(inner, k4, strict=True)))
     decay_v, decay_w = _linear(drive, d.v, d.w)
     return k1, Motion(k4.v + decay_v, k4.w + decay_w, d.w), d
@@ -131,8 +131,8 @@ def _arrive(settings, drive: Physical, state: State, held: Force, path, half: Ha
     ends; the departure in the middle is that of Hermite's cubic.
     """
     start = Motion(state.v, state.w, state.theta)
-    middle = _after(half, start, held)
-    end = _after(half, middle, held)
+    middle = after_half(half, start, held)
+    end = after_half(half, middle, held)
     rates = [Force(*(a + b for a, b in zip(_linear(drive, now.v, now.w), held, strict=True))) for now in (start, end)]
     if path is not None:
         first, last, d = path
@@ -171,7 +171,7 @@ def _rubbed(settings, drive: Physical, start: Motion, pull: Force, d: Motion | N
     still = Motion(*[jnp.zeros_like(start.v)] * 3)
 
     def at_end(begin: Motion, pushed: Force) -> Motion:
-        return _after(half, _after(half, begin, pushed), pushed)
+        return after_half(half, after_half(half, begin, pushed), pushed)
 
     end = at_end(start, pull)
     if d is not None:
@@ -220,7 +220,7 @@ def wheel_speeds(drive: Physical, v: Array, w: Array) -> Wheels:
     return to_wheels(drive, drive.rate[0] * v, drive.rate[1] * w)
 
 
-def _after(half: Half, now: Motion, held: Force | None = None) -> Motion:
+def after_half(half: Half, now: Motion, held: Force | None = None) -> Motion:
     """A motion after half a substep under a held force; a departure, to which nothing is added meanwhile, without."""
     if held is None:
         half = Half(*(Response(r.v, r.w, None, None) for r in half))

@@ -63,9 +63,12 @@ def test_without_effects_it_is_the_nominal_robot(log, follow):
     np.testing.assert_allclose(follow(nominal()), simulated(log), atol=3e-4)
 
 
-@pytest.mark.parametrize("name", COORDINATES)
-def test_every_effect_is_that_of_the_full_simulator(log, follow, name):
-    typical = CATALOGUE[name].typical() | ({"instant": 2.0} if name == "payload_change" else {})
+CASES = [(name, {}) for name in COORDINATES] + [("backlash", {"coasting": 1.0})]
+
+
+@pytest.mark.parametrize(("name", "form"), CASES)
+def test_every_effect_is_that_of_the_full_simulator(log, follow, name, form):
+    typical = CATALOGUE[name].typical() | ({"instant": 2.0} if name == "payload_change" else {}) | form
     vector = nominal()
     for key, value in from_catalogue(name, typical).items():
         vector[PLACES[name, key]] = value

@@ -52,9 +52,9 @@ def test_effects_nearly_as_good_are_named_together():
 
 def test_a_further_effect_must_bring_a_part_of_all_that_is_explained():
     def evidence(gain):
-        return Candidate(("slope", "turn_loss"), None, gain).evidence
+        return Candidate(("gain_drift", "dead_zone_drift"), None, gain).evidence
 
-    first = Candidate(("slope",), None, 10000.0).evidence
+    first = Candidate(("gain_drift",), None, 10000.0).evidence
     assert evidence(10060.0) < first
     assert evidence(10150.0) > first
 

@@ -27,9 +27,9 @@ def test_a_set_that_is_worth_its_effects_stays(exchange):
 
 
 def test_an_effect_that_brings_less_than_its_price_is_left_out(exchange):
-    """Its coordinate costs 4, the form of what is explained 10, to be claimed 9: 35 is enough, 20 is not."""
-    assert exchange({(FIRST,): 1000.0, (SECOND,): 900.0, (FIRST, SECOND): 1035.0}, (FIRST, SECOND)) == (FIRST, SECOND)
-    assert exchange({(FIRST,): 1000.0, (SECOND,): 900.0, (FIRST, SECOND): 1020.0}, (FIRST, SECOND)) == (FIRST,)
+    """Its coordinate costs 4, the form of another at its site 10, to be claimed 9: 35 is enough, 20 is not."""
+    assert exchange({(OTHER,): 1000.0, (SECOND,): 900.0, (OTHER, SECOND): 1035.0}, (OTHER, SECOND)) == (OTHER, SECOND)
+    assert exchange({(OTHER,): 1000.0, (SECOND,): 900.0, (OTHER, SECOND): 1020.0}, (OTHER, SECOND)) == (OTHER,)
 
 
 def test_the_first_gives_way_to_one_that_fits_better_beside_the_second(exchange):
@@ -39,3 +39,20 @@ def test_the_first_gives_way_to_one_that_fits_better_beside_the_second(exchange)
 
 def test_a_single_effect_has_nothing_to_exchange(exchange):
     assert exchange({(FIRST,): 30.0, (SECOND,): 40.0}, (FIRST,)) == (FIRST,)
+
+
+def test_what_may_be_the_form_of_another_costs_more():
+    """A second effect at a site that the set has already pays 1 % of what is explained, elsewhere 0.1 %."""
+    base = {("supply_sag",): 10_000.0}
+    same, other = ("supply_sag", "motor_lag"), ("supply_sag", "turn_loss")
+    price = {
+        effects: Candidate(effects, None, gain).evidence for effects, gain in {same: 10_100.0, other: 10_100.0}.items()
+    }
+    alone = Candidate(("supply_sag",), None, base[("supply_sag",)]).evidence
+    assert price[same] - alone == pytest.approx(100.0 - 4.0 - 101.0)
+    assert price[other] - alone == pytest.approx(100.0 - 4.0 - 10.1)
+
+
+def test_three_effects_pay_for_each_beyond_the_first():
+    assert which.form_price(()) == which.form_price((FIRST,)) == 0.0
+    assert which.form_price((FIRST, SECOND, OTHER)) == pytest.approx(which.FORM + which.ELSEWHERE)

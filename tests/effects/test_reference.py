@@ -9,6 +9,7 @@ from support.reference_effects import simulate_reference
 import jaxident as ji
 from jaxident.effects import CATALOGUE, to_vector
 from jaxident.effects.full import _keys, substeps_for
+from jaxident.robot.model import Effect
 
 PARAMETERS = ROBOT.physical._asdict() | {"dead_zone": ROBOT.dead_zone}
 CORNERS = ("coulomb_friction", "stiction", "backlash", "input_rate_limit")
@@ -40,6 +41,16 @@ def test_the_trajectory_is_that_of_the_reference(names):
     log = drive_log()
     found = full(to_vector(typical(*names).effects), log, substeps=substeps_for(frozenset(names)))
     assert np.abs(found - reference(names, log)).max() < tolerance(names)
+
+
+def test_a_wheel_that_coasts_in_its_play():
+    play, log = {"right": 0.03, "left": 0.05, "coasting": 1.0}, drive_log()
+    found = full(to_vector([Effect("backlash", play)]), log, substeps=substeps_for(frozenset({"backlash"})))
+    command = np.array(log.u_r), np.array(log.u_l)
+    wanted = simulate_reference(PARAMETERS, {"backlash": play}, log.t, *command, START, step=1e-3)
+    braked = simulate_reference(PARAMETERS, {"backlash": play | {"coasting": 0.0}}, log.t, *command, START, step=1e-3)
+    assert np.abs(braked - wanted).max() > 1e-2
+    assert np.abs(found - wanted).max() < tolerance(("backlash",))
 
 
 @pytest.mark.parametrize("names", [pytest.param(s, marks=[pytest.mark.slow] * (len(s) == 1)) for s in SETS])

@@ -65,10 +65,12 @@ def test_other_forms_are_other_and_alike():
     """Every other form moves the robot apart from the catalogue's, by 1 % to ten times of what the effect does."""
     mechanical = [name for name in FORMS if name in NEUTRAL and name != "lost_commands"]
     effects = [{name: CATALOGUE[name].typical()} for name in mechanical]
-    others = [{name: own[name] | {"form": form(name, own[name], 4.0)}} for name, own in zip(mechanical, effects)]
+    others = [
+        {name: own[name] | {"form": form(name, own[name], 4.0)}} for name, own in zip(mechanical, effects, strict=True)
+    ]
     rngs = [np.random.default_rng(k) for k in range(len(others))]
     plain, usual, other = (batch(each, rngs=rngs) for each in ([{} for _ in others], effects, others))
     apart = np.abs(other - usual).max(axis=(0, 2))
     moved = np.abs(usual - plain).max(axis=(0, 2))
-    assert np.all(apart > 0.01 * moved), dict(zip(mechanical, apart / moved))
-    assert np.all(apart < 10.0 * moved), dict(zip(mechanical, apart / moved))
+    ratio = dict(zip(mechanical, apart / moved, strict=True))
+    assert all(0.01 < value < 10.0 for value in ratio.values()), ratio

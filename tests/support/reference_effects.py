@@ -118,15 +118,19 @@ class Robot:
             passed.append(m * max(1.0 + self.of("gain_drift", "rate") * session, 0.0))
         return np.array(passed) / (1.0 + self.of("supply_sag", "resistance") * (abs(u[0]) + abs(u[1])))
 
+    def coasting(self, state):
+        """What lets each wheel coast, in commands."""
+        return self.of("backlash", "coasting") * (self.to_n @ state[[V, W]])
+
     def play(self, state, now):
         """Whether each gear drives, and when the next one will."""
-        m, event, engaged = self.pushes(now), math.inf, [True, True]
+        turning, event, engaged = self.pushes(now) - self.coasting(state), math.inf, [True, True]
         for wheel, side in enumerate(("right", "left")):
             half = 0.5 * self.of("backlash", side)
-            left = half - np.sign(m[wheel]) * state[P_R + wheel]
-            if half > 0.0 and m[wheel] != 0.0 and left > TINY:
+            left = half - np.sign(turning[wheel]) * state[P_R + wheel]
+            if half > 0.0 and turning[wheel] != 0.0 and left > TINY:
                 engaged[wheel] = False
-                event = min(event, now + max(left / abs(m[wheel]), TINY))
+                event = min(event, now + max(left / abs(turning[wheel]), TINY))
         return engaged, event
 
     def friction_modes(self, state, now, engaged):
@@ -161,7 +165,7 @@ class Robot:
     def unrubbed(self, state, now, engaged):
         """Acceleration of v and w without friction, and the push before the lag."""
         theta, v, w = state[[THETA, V, W]]
-        push = np.where(engaged, self.pushes(now), 0.0)
+        push = np.where(engaged, self.pushes(now), self.coasting(state))
         driving = push if self.lag == 0.0 else state[[Q_R, Q_L]]
         along = self.system @ [v, w] + self.gain @ driving
         limit = self.of("traction_limit", "limit", math.inf)
@@ -205,7 +209,7 @@ class Robot:
         ds[[V, W]] = acceleration
         if self.lag > 0.0:
             ds[[Q_R, Q_L]] = (push - state[[Q_R, Q_L]]) / self.lag
-        ds[[P_R, P_L]] = self.pushes(now)
+        ds[[P_R, P_L]] = self.pushes(now) - self.coasting(state)
         return ds
 
     def advance(self, state, now, h, engaged, modes):

@@ -18,6 +18,8 @@ from jaxident.diagnosis.motion.linear import explained, follow, gram, left_over,
 
 STEPS = np.geomspace(0.02, 0.4, 96)
 """Steps of a quantised command where nothing suggests better ones, in largest commands."""
+FORMED = ("backlash",)
+"""Effects with a derivative at neutral that says nothing of another form of theirs."""
 INSTANTS = (10.0, 1.2, 0.15)
 """Reach [s] of each search for an instant about the best before."""
 
@@ -37,6 +39,8 @@ def seeds(name: str, duration: float, steps: Iterable[float] = STEPS) -> list[di
         return [{"loss": 0.1, "instant": duration * part} for part in np.linspace(0.06, 0.94, 12)]
     if name == "lens_distortion":
         return [{"strength": 0.01}]
+    if name == "backlash":
+        return [{}, {"right": 0.02, "left": 0.02, "coasting": 1.0}]
     return [{}]
 
 
@@ -56,14 +60,15 @@ def seeded(vector: Array, name: str, seed: dict[str, float]) -> np.ndarray:
 
 def score(data: Data, solution: Solution) -> dict[str, float]:
     """What each effect promises to explain beyond a solution, its coordinates free: a linear prediction by the
-    derivative at neutral, or by the difference that its best seed makes."""
+    derivative at neutral, or by the difference that its best seed makes, whichever is more."""
     free = list(solution.places)
     smooth = {name: [PLACES[pair] for pair in sizes_of(name) if PLACES[pair] not in free] for name in SMOOTH}
+    seeded_names = [name for name in COORDINATES if name not in SMOOTH or name in FORMED]
     more = [place for places in smooth.values() for place in places]
     linear = linearise(solution.vector, solution.starts, data.windows, [*free, *more])
     jumps = [
-        (name, seed) for name in COORDINATES if name not in SMOOTH and PLACES[sizes_of(name)[0]] not in free
-        for seed in _own_seeds(name, data, solution)
+        (name, seed) for name in seeded_names if PLACES[sizes_of(name)[0]] not in free
+        for seed in _own_seeds(name, data, solution) if seed
     ]  # fmt: skip
     change = differences(data, solution, [seeded(solution.vector, *jump) for jump in jumps])
     columns = np.concatenate([linear.slopes, change, linear.residual[..., None]], axis=2)[data.use]
@@ -93,9 +98,11 @@ def differences(data: Data, solution: Solution, vectors: list[np.ndarray]) -> np
 
 
 def beginnings(data: Data, solution: Solution, name: str) -> list[np.ndarray]:
-    """Vectors from which to refit one more effect: neutral; or the seed that promises most, and one of middling size,
-    for at a fit that a large effect has bent the promises mislead."""
+    """Vectors from which to refit one more effect: neutral, and a seed of each further form; or the seed that promises
+    most, and one of middling size, for at a fit that a large effect has bent the promises mislead."""
     points = _own_seeds(name, data, solution)
+    if name in FORMED:
+        return [seeded(solution.vector, name, point) for point in points]
     if name in SMOOTH or len(points) == 1:
         return [seeded(solution.vector, name, points[0])]
     vectors, gains = _promises(data, solution, name, points)

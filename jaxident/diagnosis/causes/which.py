@@ -9,7 +9,14 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.causes.scores import at_best_instant, beginnings, score
 from jaxident.diagnosis.causes.search import Data, Solution, refit
 from jaxident.diagnosis.causes.unexplained import unexplained
-from jaxident.diagnosis.motion.coordinates import COORDINATES, NOMINAL, SHAPES, free_places, neutral_vector
+from jaxident.diagnosis.motion.coordinates import (
+    COORDINATES,
+    NOMINAL,
+    SHAPES,
+    STEPPED,
+    free_places,
+    neutral_vector,
+)
 from jaxident.diagnosis.motion.responses import Responses, respond
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.diagnosis.noise.law import Law, whitener_of
@@ -24,9 +31,10 @@ PENALTY = 4.0
 ENOUGH = 9.0
 """Gain beyond the penalty that claims an effect. With it a coordinate that does nothing gains as much once in three
 million times (chi-squared at 26), if the noise law is right; the rest is room for a law that is not quite."""
-FORM = 0.01
-"""Part of all that is explained which every further effect must bring: a robot's own form of an effect is never quite
-that of the catalogue, and what it leaves looks like another one."""
+FORM, ELSEWHERE = 0.01, 0.001
+"""Part of all that is explained which a further effect must bring at a site where the set has one already, and at
+another: a robot's own form of an effect is never quite that of the catalogue, and what it leaves looks like another one
+of the same site."""
 MOST_EFFECTS, BESIDE = 3, 4
 """Effects in a set at most, and how many are refitted beside a set before one is accepted."""
 LIKELY = 1.0
@@ -43,9 +51,16 @@ class Candidate(NamedTuple):
 
     @property
     def evidence(self) -> float:
-        """Gain less the price of its coordinates, and of every effect beyond the first."""
+        """Gain less the price of its coordinates, and of what may only be the form of others."""
         price = PENALTY * sum(len(COORDINATES[name]) for name in self.effects)
-        return self.gain - price - FORM * max(self.gain, 0.0) * max(len(self.effects) - 1, 0)
+        return self.gain - price - form_price(self.effects) * max(self.gain, 0.0)
+
+
+def form_price(effects: Collection[str]) -> float:
+    """Part of all that is explained which a set must bring beside its first effect."""
+    sites = [CATALOGUE[name].site for name in effects]
+    distinct = len(set(sites))
+    return FORM * (len(sites) - distinct) + ELSEWHERE * max(distinct - 1, 0)
 
 
 class Finding(NamedTuple):
@@ -141,7 +156,7 @@ def _try(found: dict, data: Data, begin: Solution, names: list[str], beside: tup
 
 def _refit_with_shapes(data: Data, vector: Array, starts: Array, effects: tuple[str, ...]) -> Solution:
     """A refit that first finds the size of the last effect: what only shapes it is lost until then."""
-    shapes = tuple(pair for pair in SHAPES if pair[0] == effects[-1])
+    shapes = tuple(pair for pair in SHAPES - STEPPED if pair[0] == effects[-1])
     if shapes:
         first = refit(data, vector, starts, effects, shapes, most=4)
         vector, starts = first.vector, first.starts

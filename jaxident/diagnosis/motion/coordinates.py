@@ -48,7 +48,7 @@ COORDINATES: dict[str, tuple[Coordinate, ...]] = {
     "input_rate_limit": (_positive("inverse_rate", 2.0),),
     "transport_delay": (_positive("delay", 0.5),),
     "motor_lag": (_positive("time_constant", 0.5),),
-    "backlash": (_positive("right", 0.5), _positive("left", 0.5)),
+    "backlash": (_positive("right", 0.5), _positive("left", 0.5), Coordinate("coasting", 0.0, 0.0, 1.0, 1.0)),
     "supply_sag": (_positive("resistance", 1.0),),
     "coulomb_friction": (_positive("right", 0.5), _positive("left", 0.5)),
     "stiction": (_positive("right", 0.6), _positive("left", 0.6), Coordinate("fade", 0.05, 0.005, 0.4, 0.05)),
@@ -79,11 +79,11 @@ SMOOTH = tuple(
 )  # fmt: skip
 """Effects whose score is a derivative at neutral; the others are looked for from `seeds`."""
 
-STEPPED = {("input_quantisation", "step")}
-"""Coordinates that poses follow in jumps: looked for on a grid alone."""
+STEPPED = {("input_quantisation", "step"), ("backlash", "coasting")}
+"""Coordinates that poses follow in jumps, or that choose between two forms: looked for on a grid alone."""
 
 SHAPES = {("stiction", "fade"), ("payload_change", "instant"), ("lens_distortion", "centre_x"),
-          ("lens_distortion", "centre_y")}  # fmt: skip
+          ("lens_distortion", "centre_y"), ("backlash", "coasting")}  # fmt: skip
 """Coordinates that shape an effect and do nothing alone."""
 
 PLACES = {
@@ -152,7 +152,7 @@ def from_catalogue(name: str, values: Mapping[str, float]) -> dict[str, float]:
         return {"x": g * np.cos(angle), "y": g * np.sin(angle)}
     if name == "payload_change":
         return {"loss": 1.0 - 1.0 / values["ratio"], "instant": values["instant"]}
-    return {coordinate.name: values[coordinate.name] for coordinate in COORDINATES[name]}
+    return {c.name: values.get(c.name, c.neutral) for c in COORDINATES[name]}
 
 
 def unit_factors(name: str, largest: float) -> dict[str, float]:

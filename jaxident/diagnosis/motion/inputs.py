@@ -20,12 +20,14 @@ from jaxident.effects.actuation import (
 )
 from jaxident.effects.time import dead_zone_drift, gain_drift
 from jaxident.numerics import safe_divide
+from jaxident.robot.drive import Physical
 
 PUSHING = (
     "asymmetric_dead_zone", "direction_gain", "input_saturation", "input_quantisation", "input_rate_limit",
     "transport_delay", "motor_lag", "backlash", "supply_sag", "gain_drift", "dead_zone_drift",
 )  # fmt: skip
-"""Effects that act before the wheels: beside the dead zones, pushes depend on nothing else."""
+"""Effects that act before the wheels: beside the dead zones, pushes depend on nothing else but, where wheels coast in
+the play of their gears, on the nominal drive."""
 SUBSTEPS = 2
 """Per row; the nominal part is exact whatever their number."""
 NODES = (0.21132486540518713, 0.7886751345948129)
@@ -41,13 +43,14 @@ class Push(NamedTuple):
     slope: Any
 
 
-def pushes(settings, dead_zone: Array, t: Array, session: Array, command: Array) -> Push:
-    """The pushes of runs: t (rows, runs) [s], session (runs,) [s], command (rows, runs, 2); dead_zone (2,)."""
+def pushes(settings, drive: Physical, dead_zone: Array, t: Array, session: Array, command: Array) -> Push:
+    """The pushes of runs: t (rows, runs) [s], session (runs,) [s], command (rows, runs, 2); dead_zone (2,). drive: what
+    tells the speed of wheels that coast."""
     step = jnp.diff(t, axis=0, append=t[-1:] + 1.0)
     part = step / SUBSTEPS
     asked = _asked(settings, dead_zone, t, session, command, part)
     asked = _delayed(asked, t, part, settings["transport_delay"]["delay"])
-    return _remembered(settings, asked, part)
+    return _remembered(settings, drive, asked, part)
 
 
 def _asked(settings, dead_zone: Array, t: Array, session: Array, command: Array, part: Array) -> Push:
@@ -134,27 +137,38 @@ def _integral(pieces: Array) -> Array:
     return jnp.concatenate([jnp.zeros_like(pieces[:1]), jnp.cumsum(pieces, axis=0)])
 
 
-def _remembered(settings, asked: Push, part: Array) -> Push:
+def _remembered(settings, drive: Physical, asked: Push, part: Array) -> Push:
     """Pushes (rows * substeps, runs, 2) behind the play of the gears and the lag of the motors, as (rows, runs,
     substeps, 2)."""
     mean, slope = asked
     rows, runs = part.shape
     size = jnp.repeat(part, SUBSTEPS, axis=0)[..., None]
-    mean, slope = _played(_pair(settings, "backlash"), mean, slope, size)
+    mean, slope = _played(_pair(settings, "backlash"), settings["backlash"]["coasting"], drive, mean, slope, size)
     mean, slope = _lagged(settings["motor_lag"]["time_constant"], mean, slope, size)
     return Push(*(x.reshape(rows, SUBSTEPS, runs, 2).transpose(0, 2, 1, 3) for x in (mean, slope)))
 
 
-def _played(width: Array, mean: Array, slope: Array, size: Array) -> tuple[Array, Array]:
-    """What passes the play: nothing for a first part of some substeps."""
+def _played(width: Array, coasting: Array, drive: Physical, mean, slope, size) -> tuple[Array, Array]:
+    """What passes the play: for a first part of some substeps no more than what lets the wheels coast, whose speeds are
+    those of the nominal drive."""
+    (a, b), (c, d) = drive.gain
+    gain = jnp.array([[a, b], [c, d]])
+    inverse = jnp.linalg.inv(gain)
+    decay = jnp.exp(-drive.rate * size)
 
-    def body(position, now):
-        mean, own = now
-        return backlash(position, mean, own, width)
+    def body(carry, now):
+        position, speeds = carry
+        mean, own, decay = now
+        across = speeds[:, ::-1] * drive.coupling
+        coasts = coasting * (speeds * drive.rate) @ inverse.T
+        position, free = backlash(position, mean - coasts, own, width)
+        steady = ((free * coasts + (1.0 - free) * mean) @ gain.T + across) / drive.rate
+        return (position, steady + (speeds - steady) * decay), (free, coasts)
 
-    free = jax.lax.scan(body, jnp.zeros_like(mean[0]), (mean, size))[1]
-    driving = 1.0 - free
-    return driving * mean, driving * slope + 6.0 * free * driving * mean
+    still = jnp.zeros_like(mean[0])
+    free, coasts = jax.lax.scan(body, (still, still), (mean, size, decay))[1]
+    driving, turning = 1.0 - free, mean - coasts
+    return coasts + driving * turning, driving * slope + 6.0 * free * driving * turning
 
 
 def _lagged(time_constant: Array, mean: Array, slope: Array, size: Array) -> tuple[Array, Array]:

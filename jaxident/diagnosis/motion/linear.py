@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.motion.coordinates import PLACES, limits, sizes
+from jaxident.diagnosis.motion.coordinates import NOMINAL, PLACES, limits, sizes
 from jaxident.diagnosis.motion.inputs import PUSHING
 from jaxident.diagnosis.motion.paths import push_of, residuals
 from jaxident.diagnosis.motion.responses import answer_to_start
@@ -48,10 +48,14 @@ def follow(vectors: Array, starts: Array, windows: Windows) -> np.ndarray:
     """Residuals (batch, windows, numbers) at vectors (batch, SIZE) and starts (batch, 5, windows).
 
     One vector after the other: more lanes of one program run no faster, and vectors that drive the wheels alike, as
-    most columns of a linearisation do, share what costs most.
+    most columns of a linearisation do, share what costs most. Wheels that coast in their play are driven alike by equal
+    drives only.
     """
     windows = jax.tree.map(jnp.asarray, windows)
-    _, first, own = np.unique(vectors[:, _PUSHING], axis=0, return_index=True, return_inverse=True)
+    driven = vectors[:, _PUSHING]
+    if np.any(vectors[:, PLACES["backlash", "coasting"]] > 0.0):
+        driven = np.concatenate([driven, vectors[:, : len(NOMINAL)]], axis=1)
+    _, first, own = np.unique(driven, axis=0, return_index=True, return_inverse=True)
     push = [_pushed(vectors[k], windows) for k in first]
     found = [_moved(*pair, push[k], windows) for *pair, k in zip(vectors, starts, own.ravel(), strict=True)]
     whole = np.stack([np.asarray(one) for one in found])

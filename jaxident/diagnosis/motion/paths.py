@@ -65,9 +65,14 @@ def track(vector: Array, starts: Array, windows: Windows) -> Track:
     return move(vector, by_effect(vector), push_of(vector, windows), starts, windows)
 
 
+def drive_of(vector: Array) -> Physical:
+    """The nominal drive of a vector (SIZE,)."""
+    return Physical(jnp.exp(vector[:2]), ((vector[2], vector[3]), (vector[4], vector[5])), vector[8:10])
+
+
 def push_of(vector: Array, windows: Windows) -> Push:
     """What drives the wheels: pushes of whole runs cut into windows, (rows, substeps, 2, windows)."""
-    push = pushes(by_effect(vector), vector[6:8], windows.t, windows.session, windows.command)
+    push = pushes(by_effect(vector), drive_of(vector), vector[6:8], windows.t, windows.session, windows.command)
     rows = windows.step.shape[0]
     places = jnp.minimum(windows.first + jnp.arange(rows)[:, None], push.mean.shape[0] - 1)
     return Push(*(part[places, windows.run].transpose(0, 2, 3, 1) for part in push))
@@ -75,7 +80,7 @@ def push_of(vector: Array, windows: Windows) -> Push:
 
 def move(vector: Array, settings, push: Push, starts: Array, windows: Windows) -> Track:
     """True states (rows, windows) under pushes (rows, substeps, 2, windows)."""
-    drive = Physical(jnp.exp(vector[:2]), ((vector[2], vector[3]), (vector[4], vector[5])), vector[8:10])
+    drive = drive_of(vector)
     part = windows.step / SUBSTEPS
     lags = [Lag(hold_integrals(rate, 0.5 * part), hold_integrals(rate, part)) for rate in drive.rate]
     time = windows.session[windows.run] + windows.t[windows.first, windows.run]
