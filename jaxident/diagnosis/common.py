@@ -9,9 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jaxident.diagnosis.causes.candidates import ENOUGH, PENALTY, Candidate, Finding
 from jaxident.diagnosis.causes.search import refit
 from jaxident.diagnosis.causes.unexplained import unexplained
-from jaxident.diagnosis.causes.which import ENOUGH, PENALTY, Candidate, Finding, one_more
+from jaxident.diagnosis.causes.which import one_more
 from jaxident.diagnosis.motion.coordinates import COORDINATES, NOMINAL, PLACES, free_places, neutral_vector
 from jaxident.diagnosis.motion.responses import respond
 

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from jaxident.diagnosis import translate
+from jaxident.diagnosis.causes.candidates import ENOUGH, Finding
 from jaxident.diagnosis.causes.direct import direct_effects, direct_evidence
-from jaxident.diagnosis.causes.which import ENOUGH, Finding
 from jaxident.diagnosis.extent.measure import Gap, measure
 from jaxident.diagnosis.extent.shrink import Shrink
 from jaxident.diagnosis.extent.where import Place

@@ -1,7 +1,8 @@
 """The search, and the search again with the commands that arrived where some were lost."""
 
+from jaxident.diagnosis.causes.candidates import ENOUGH, PENALTY, Finding
 from jaxident.diagnosis.causes.lost import find_lost
-from jaxident.diagnosis.causes.which import ENOUGH, PENALTY, Finding, search_effects
+from jaxident.diagnosis.causes.which import search_effects
 from jaxident.diagnosis.prepare import Prepared, repaired
 
 REPAIRS = 2

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
+from jaxident.diagnosis.causes.candidates import ENOUGH, PENALTY
 from jaxident.diagnosis.causes.scores import differences, seeded, sizes_of
 from jaxident.diagnosis.causes.search import Data, Solution
-from jaxident.diagnosis.causes.which import ENOUGH, PENALTY
 from jaxident.diagnosis.motion.coordinates import COORDINATES, PLACES, SMOOTH, from_catalogue, unit_factors
 from jaxident.diagnosis.motion.linear import gram, linearise, normal
 from jaxident.effects.catalogue import CATALOGUE

@@ -5,8 +5,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from jaxident.diagnosis.causes.candidates import ENOUGH, Finding
 from jaxident.diagnosis.causes.direct import direct_effects, direct_evidence
-from jaxident.diagnosis.causes.which import ENOUGH, Finding, search_effects
+from jaxident.diagnosis.causes.which import search_effects
 from jaxident.diagnosis.common import MOSTLY, Values, explain_together
 from jaxident.diagnosis.noise.law import Law, first_law
 from jaxident.diagnosis.prepare import Prepared, prepare

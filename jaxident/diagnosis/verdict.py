@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jaxident.diagnosis.causes.candidates import ENOUGH, Finding
 from jaxident.diagnosis.causes.unexplained import UNEXPLAINED
-from jaxident.diagnosis.causes.which import ENOUGH, Finding
 from jaxident.diagnosis.common import Values
 from jaxident.diagnosis.extent.measure import Gap
 from jaxident.diagnosis.extent.shrink import interval

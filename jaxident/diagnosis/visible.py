@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from jaxident.diagnosis.causes.which import ENOUGH
+from jaxident.diagnosis.causes.candidates import ENOUGH
 from jaxident.diagnosis.motion.coordinates import COORDINATES, SHAPES, from_catalogue, to_catalogue
 from jaxident.effects.catalogue import CATALOGUE
 
@@ -32,4 +32,5 @@ def _smallest(name: str, gain: float) -> dict[str, float] | None:
     }
     if name == "payload_change" and not scaled["loss"] < 1.0:
         return None  # no payload takes away more than all
-    return {key: value for key, value in to_catalogue(name, scaled).items() if (name, key) not in SHAPES}
+    shapes = [parameter.name for parameter in CATALOGUE[name].parameters if parameter.shape]
+    return {key: value for key, value in to_catalogue(name, scaled).items() if key not in shapes}

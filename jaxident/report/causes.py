@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from jaxident import plot
-from jaxident.diagnosis.causes.which import ENOUGH, PENALTY, Candidate
+from jaxident.diagnosis.causes.candidates import ENOUGH, PENALTY, Candidate
 from jaxident.diagnosis.diagnose import Diagnosis
 from jaxident.diagnosis.motion.coordinates import COORDINATES
 from jaxident.diagnosis.replay import DRAWS, FAINT, Replay

@@ -7,9 +7,9 @@ import pytest
 from support.diagnoses import made_up
 
 from jaxident.diagnosis import common
+from jaxident.diagnosis.causes.candidates import Candidate
 from jaxident.diagnosis.causes.corrector import Term
 from jaxident.diagnosis.causes.search import Solution
-from jaxident.diagnosis.causes.which import Candidate
 from jaxident.diagnosis.common import apart, explain_together, shared_worth
 from jaxident.diagnosis.motion.coordinates import free_places, neutral_vector
 

@@ -7,10 +7,19 @@ import pytest
 
 from jaxident.diagnosis.causes.lost import find_lost
 from jaxident.diagnosis.causes.rhythm import rhythms
-from jaxident.diagnosis.causes.scores import at_best_instant
+from jaxident.diagnosis.causes.scores import INSTANT, at_best, beginnings
+from jaxident.diagnosis.causes.scores import STEP as STEP_OF
 from jaxident.diagnosis.causes.search import Data, refit
 from jaxident.diagnosis.causes.steps import likely_steps
-from jaxident.diagnosis.motion.coordinates import COORDINATES, PLACES, neutral_vector, nominal_vector
+from jaxident.diagnosis.motion.coordinates import (
+    COORDINATES,
+    PLACES,
+    by_effect,
+    from_catalogue,
+    neutral_vector,
+    nominal_vector,
+    to_catalogue,
+)
 from jaxident.diagnosis.motion.linear import explained, follow, gram
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.motion.windows import cut
@@ -74,7 +83,34 @@ def test_a_payload_is_placed_where_it_came():
     begin[PLACES["payload_change", "loss"]], begin[place] = 0.1, 18.0
     held = (("payload_change", "instant"),)
     first = refit(data, begin, nominal.starts, ("payload_change",), held, most=4)
-    assert abs(at_best_instant(data, first)[place] - 13.3) < 0.3
+    assert abs(at_best(data, first, INSTANT)[place] - 13.3) < 0.3
+
+
+def test_a_step_is_settled_to_where_commands_round_alike():
+    """From 0.15 % off to within the step's own jumps: every command that is told rounds to the tooth it did."""
+    vector = VECTOR.copy()
+    vector[PLACES[STEP_OF]] = true = 0.2159
+    data, nominal = nominal_fit(windows_of(vector))
+    begin = nominal.vector.copy()
+    begin[PLACES[STEP_OF]] = 1.0015 * true
+    first = refit(data, begin, nominal.starts, ("input_quantisation",), most=4)
+    found = at_best(data, first, STEP_OF)[PLACES[STEP_OF]]
+    teeth = [np.round(data.windows.command / step) for step in (true, 1.0015 * true, found)]
+    assert np.any(teeth[0] != teeth[1])
+    np.testing.assert_array_equal(teeth[0], teeth[2])
+
+
+def test_a_lens_off_the_middle_of_the_field_is_found():
+    lens = {"strength": 0.3, "centre_x": 0.15, "centre_y": -0.2}
+    vector = VECTOR.copy()
+    for key, value in from_catalogue("lens_distortion", lens).items():
+        vector[PLACES["lens_distortion", key]] = value
+    data, nominal = nominal_fit(windows_of(vector))
+    (begin,) = beginnings(data, nominal, "lens_distortion")
+    found = refit(data, begin, nominal.starts, ("lens_distortion",))
+    told = to_catalogue("lens_distortion", by_effect(found.vector)["lens_distortion"])
+    for key, value in lens.items():
+        assert told[key] == pytest.approx(value, abs=0.05), key
 
 
 def test_commands_that_came_late_are_found_one_by_one(plain):

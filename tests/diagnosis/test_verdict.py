@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from support.diagnoses import made_up
 
+from jaxident.diagnosis.causes.candidates import Candidate
 from jaxident.diagnosis.causes.corrector import Term
-from jaxident.diagnosis.causes.which import Candidate
 from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.simulator import Simulator
 from jaxident.diagnosis.verdict import alike, judge, slip_of_drive, unknown_probability

@@ -3,7 +3,7 @@
 import pytest
 
 from jaxident.diagnosis.causes import which
-from jaxident.diagnosis.causes.which import Candidate
+from jaxident.diagnosis.causes.candidates import ELSEWHERE, FORM, Candidate, form_price
 
 FIRST, SECOND, OTHER = "turn_loss", "supply_sag", "transport_delay"
 
@@ -54,5 +54,14 @@ def test_what_may_be_the_form_of_another_costs_more():
 
 
 def test_three_effects_pay_for_each_beyond_the_first():
-    assert which.form_price(()) == which.form_price((FIRST,)) == 0.0
-    assert which.form_price((FIRST, SECOND, OTHER)) == pytest.approx(which.FORM + which.ELSEWHERE)
+    assert form_price(()) == form_price((FIRST,)) == 0.0
+    assert form_price((FIRST, SECOND, OTHER)) == pytest.approx(FORM + ELSEWHERE)
+
+
+def test_the_rival_is_the_best_set_of_one_effect_more_whatever_its_form_costs():
+    """It is looked for before the price of forms: under a law that took it for noise it gains too little for that."""
+    gains = {(): 0.0, (FIRST,): 10_000.0, (SECOND,): 900.0, (FIRST, SECOND): 10_020.0, (OTHER, SECOND): 20_000.0}
+    found = {effects: Candidate(effects, None, gain) for effects, gain in gains.items()}
+    assert which._rival(found, (FIRST,)).effects == (FIRST, SECOND)
+    found[FIRST, SECOND] = Candidate((FIRST, SECOND), None, 10_010.0)
+    assert which._rival(found, (FIRST,)) is None

@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
+from jaxident.diagnosis.causes.candidates import Candidate, Finding
 from jaxident.diagnosis.causes.corrector import Term
-from jaxident.diagnosis.causes.which import Candidate, Finding
 from jaxident.diagnosis.diagnose import Diagnosis, Gap, Parameter
 from jaxident.diagnosis.extent.floor import Floor
 from jaxident.diagnosis.extent.shrink import Shrink

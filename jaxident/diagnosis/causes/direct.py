@@ -1,7 +1,7 @@
 """Effects that show without a refit: commands that never arrived, frames that repeat, outliers, a camera error with a
 memory."""
 
-from jaxident.diagnosis.causes.which import ENOUGH, Finding
+from jaxident.diagnosis.causes.candidates import ENOUGH, Finding
 from jaxident.diagnosis.prepare import Prepared
 
 

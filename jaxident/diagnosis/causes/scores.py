@@ -10,18 +10,24 @@ from jaxident.diagnosis.causes.steps import likely_steps
 from jaxident.diagnosis.motion.coordinates import (
     COORDINATES,
     PLACES,
-    SHAPES,
+    SILENT,
     SMOOTH,
     STEPPED,
+    limits,
 )
-from jaxident.diagnosis.motion.linear import explained, follow, gram, left_over, linearise
+from jaxident.diagnosis.motion.linear import explained, follow, gram, left_over, linearise, normal
 
 STEPS = np.geomspace(0.02, 0.4, 96)
 """Steps of a quantised command where nothing suggests better ones, in largest commands."""
 FORMED = ("backlash",)
 """Effects with a derivative at neutral that says nothing of another form of theirs."""
+LENS, CENTRES = 0.01, 6
+"""Strength [1/m^2] of a lens, and places along each axis of the field where its centre is looked for."""
 INSTANTS = (10.0, 1.2, 0.15)
 """Reach [s] of each search for an instant about the best before."""
+STEP_PARTS = (2e-3, 2e-4)
+"""Reach, as a part of it, of each search for a step: of a thousand levels some lie within a thousandth of a jump."""
+INSTANT, STEP = ("payload_change", "instant"), ("input_quantisation", "step")
 
 
 def seeds(name: str, duration: float, steps: Iterable[float] = STEPS) -> list[dict[str, float]]:
@@ -38,16 +44,27 @@ def seeds(name: str, duration: float, steps: Iterable[float] = STEPS) -> list[di
     if name == "payload_change":
         return [{"loss": 0.1, "instant": duration * part} for part in np.linspace(0.06, 0.94, 12)]
     if name == "lens_distortion":
-        return [{"strength": 0.01}]
+        return [{"strength": LENS}]
     if name == "backlash":
         return [{}, {"right": 0.02, "left": 0.02, "coasting": 1.0}]
     return [{}]
 
 
 def _own_seeds(name: str, data: Data, solution: Solution) -> list[dict[str, float]]:
-    """Seeds for a solution's data; steps of a quantised command are those that its residuals suggest."""
+    """Seeds for a solution's data; steps of a quantised command are those that its residuals suggest, centres of a lens
+    lie all over the field."""
+    if name == "lens_distortion":
+        return [{"strength": LENS, "pull_x": LENS * x, "pull_y": LENS * y} for x, y in _centres(data)]
     steps = likely_steps(data, solution) if name == "input_quantisation" else STEPS
     return seeds(name, float(data.windows.session[-1] + data.windows.t[-1, -1]), steps)
+
+
+def _centres(data: Data) -> list[tuple[float, float]]:
+    """Places (x, y) all over the field that the poses fill, and somewhat beyond."""
+    seen = np.asarray(data.windows.pose)[np.asarray(data.windows.seen)]
+    ends = [np.percentile(seen[:, k], (1, 99)) for k in (0, 1)]
+    x, y = (np.linspace(low - 0.25 * (high - low), high + 0.25 * (high - low), CENTRES) for low, high in ends)
+    return [(float(a), float(b)) for a in x for b in y]
 
 
 def seeded(vector: Array, name: str, seed: dict[str, float]) -> np.ndarray:
@@ -86,7 +103,7 @@ def score(data: Data, solution: Solution) -> dict[str, float]:
 
 def sizes_of(name: str) -> list[tuple[str, str]]:
     """The coordinates of an effect that do something alone."""
-    return [(name, c.name) for c in COORDINATES[name] if (name, c.name) not in SHAPES]
+    return [(name, c.name) for c in COORDINATES[name] if (name, c.name) not in SILENT]
 
 
 def differences(data: Data, solution: Solution, vectors: list[np.ndarray]) -> np.ndarray:
@@ -99,38 +116,47 @@ def differences(data: Data, solution: Solution, vectors: list[np.ndarray]) -> np
 
 def beginnings(data: Data, solution: Solution, name: str) -> list[np.ndarray]:
     """Vectors from which to refit one more effect: neutral, and a seed of each further form; or the seed that promises
-    most, and one of middling size, for at a fit that a large effect has bent the promises mislead."""
+    most, and one of middling size where size matters, for at a fit that a large effect has bent the promises mislead.
+    """
     points = _own_seeds(name, data, solution)
     if name in FORMED:
         return [seeded(solution.vector, name, point) for point in points]
-    if name in SMOOTH or len(points) == 1:
+    if len(points) == 1:
         return [seeded(solution.vector, name, points[0])]
-    vectors, gains = _promises(data, solution, name, points)
+    vectors, gains, parts = _promises(data, solution, name, points)
     best = int(np.argmax(gains))
+    if name in SMOOTH:  # as large as it promises most: a faint lens far off bends the field as if it were a scale
+        low, high = limits()
+        return [np.clip(solution.vector + parts[best] * (vectors[best] - solution.vector), low, high)]
     if any((name, key) in STEPPED for key in points[best]):
         near = [{key: v * part for key, v in points[best].items()} for part in np.linspace(0.99, 1.01, 15)]
-        vectors, gains = _promises(data, solution, name, near)
+        vectors, gains, _ = _promises(data, solution, name, near)
         return [vectors[int(np.argmax(gains))]]
     middle = (3 * len(points)) // 5
     return [vectors[best]] if best == middle else [vectors[best], vectors[middle]]
 
 
-def _promises(data: Data, solution: Solution, name: str, points) -> tuple[list[np.ndarray], list[float]]:
-    """Vectors with an effect at some seeds, and the gain that each promises."""
+def _promises(data: Data, solution: Solution, name: str, points) -> tuple[list[np.ndarray], list[float], list[float]]:
+    """Vectors with an effect at some seeds, the gain that each promises, and of how many times its size."""
     vectors = [seeded(solution.vector, name, seed) for seed in points]
     change = differences(data, solution, vectors)
     columns = np.concatenate([solution.linear.slopes, change, solution.linear.residual[..., None]], axis=2)[data.use]
     products = gram(data.whitener[data.use], columns, solution.linear.starts[data.use]).products.sum(axis=0)
     base = list(range(len(solution.places)))
-    return vectors, [explained(products, base, [len(base) + k]) for k in range(len(points))]
+    gains, parts = [], []
+    for k in range(len(points)):
+        gains.append(explained(products, base, [len(base) + k]))
+        own, cross, scale = normal(products, [*base, len(base) + k])
+        parts.append(float(np.linalg.solve(own, cross)[-1] / scale[-1]))
+    return vectors, gains, parts
 
 
-def at_best_instant(data: Data, solution: Solution) -> np.ndarray:
-    """The vector of a solution with the payload's change where it fits best, all else following linearly: between two
-    poses -log p has as many valleys as there are windows."""
-    place, base = PLACES["payload_change", "instant"], len(solution.places)
+def at_best(data: Data, solution: Solution, pair: tuple[str, str]) -> np.ndarray:
+    """The vector of a solution with one coordinate, an instant or a step, where it fits best, all else following
+    linearly: -log p has a valley in every window, or jumps wherever a command rounds to another tooth."""
+    place, base = PLACES[pair], len(solution.places)
     best = np.array(solution.vector)
-    for span in INSTANTS:
+    for span in INSTANTS if pair == INSTANT else best[place] * np.array(STEP_PARTS):
         vectors = np.tile(best, (17, 1))
         vectors[:, place] += span * np.linspace(-1.0, 1.0, len(vectors))
         lanes = np.broadcast_to(solution.starts, (len(vectors), *solution.starts.shape))
@@ -139,5 +165,14 @@ def at_best_instant(data: Data, solution: Solution) -> np.ndarray:
         products = gram(data.whitener[data.use], columns, solution.linear.starts[data.use]).products.sum(axis=0)
         orders = [[*range(base), base + k] for k in range(len(vectors))]
         left = [left_over(products[np.ix_(order, order)], order[:-1]) for order in orders]
-        best = vectors[int(np.argmin(left))]
+        best = vectors[_middle_of_best(np.array(left))]
     return best
+
+
+def _middle_of_best(left: Array) -> int:
+    """The place in the middle of those next to the best that are as good."""
+    best = int(np.argmin(left))
+    worse = np.flatnonzero(left > left[best] + 0.5)
+    low = np.max(worse[worse < best], initial=-1)
+    high = np.min(worse[worse > best], initial=len(left))
+    return int((low + high) // 2)

@@ -9,7 +9,7 @@ from jaxident.diagnosis.motion.coordinates import PLACES, STEPPED, free_places, 
 from jaxident.diagnosis.motion.linear import Linear, follow, gram, linearise, normal
 from jaxident.diagnosis.motion.windows import Windows
 
-MOST_STEPS = 12
+MOST_STEPS = 20
 ENOUGH = 0.05
 """Promised fall of -log p below which the search ends."""
 LONGEST = 0.5

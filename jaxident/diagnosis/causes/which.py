@@ -1,12 +1,13 @@
 """Which effect: scores of all from the nominal fit, full refits of the best, then a second and a third beside it."""
 
 from collections.abc import Collection
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.scores import at_best_instant, beginnings, score
+from jaxident.diagnosis.causes.candidates import ENOUGH, PENALTY, Candidate, Finding
+from jaxident.diagnosis.causes.scores import INSTANT, STEP, at_best, beginnings, score
 from jaxident.diagnosis.causes.search import Data, Solution, refit
 from jaxident.diagnosis.causes.unexplained import unexplained
 from jaxident.diagnosis.motion.coordinates import (
@@ -19,22 +20,15 @@ from jaxident.diagnosis.motion.coordinates import (
 )
 from jaxident.diagnosis.motion.responses import Responses, respond
 from jaxident.diagnosis.motion.windows import Windows
-from jaxident.diagnosis.noise.law import Law, whitener_of
+from jaxident.diagnosis.noise.law import Law, is_quieter, whitener_of
 from jaxident.diagnosis.noise.sizing import WORTH, size_noise
 from jaxident.effects.catalogue import CATALOGUE
 
 REFITS, KEPT = 6, 4
 """Effects that are refitted first, look-alikes of the best on top, and how many of them again under the noise that the
 best leaves."""
-PENALTY = 4.0
-"""Fall of -log p that each coordinate of an effect costs."""
-ENOUGH = 9.0
-"""Gain beyond the penalty that claims an effect. With it a coordinate that does nothing gains as much once in three
-million times (chi-squared at 26), if the noise law is right; the rest is room for a law that is not quite."""
-FORM, ELSEWHERE = 0.01, 0.001
-"""Part of all that is explained which a further effect must bring at a site where the set has one already, and at
-another: a robot's own form of an effect is never quite that of the catalogue, and what it leaves looks like another one
-of the same site."""
+TAKEN = 0.7
+"""Part of some noise that is left beside one more effect where the law before took that effect for noise."""
 MOST_EFFECTS, BESIDE = 3, 4
 """Effects in a set at most, and how many are refitted beside a set before one is accepted."""
 LIKELY = 1.0
@@ -42,53 +36,14 @@ LIKELY = 1.0
 would be too low, and too sure."""
 
 
-class Candidate(NamedTuple):
-    """A set of effects refitted: its solution and its gain, the fall of -log p from the nominal fit."""
+class Search(NamedTuple):
+    """A stage of the search: candidates by their effects, the data under the law of this stage, and the set chosen."""
 
-    effects: tuple[str, ...]
-    solution: Solution
-    gain: float
-
-    @property
-    def evidence(self) -> float:
-        """Gain less the price of its coordinates, and of what may only be the form of others."""
-        price = PENALTY * sum(len(COORDINATES[name]) for name in self.effects)
-        return self.gain - price - form_price(self.effects) * max(self.gain, 0.0)
-
-
-def form_price(effects: Collection[str]) -> float:
-    """Part of all that is explained which a set must bring beside its first effect."""
-    sites = [CATALOGUE[name].site for name in effects]
-    distinct = len(set(sites))
-    return FORM * (len(sites) - distinct) + ELSEWHERE * max(distinct - 1, 0)
-
-
-class Finding(NamedTuple):
-    """Where the search ended: data under the noise law of the search; the law beside the corrector's terms, and the
-    likeliest one without them, which takes what they explain for noise; the nominal fit, all candidates of every stage
-    by their effects, the selected set, and terms of the corrector with what each still explains."""
-
+    found: dict[tuple[str, ...], Candidate]
     data: Data
+    responses: Responses
     law: Law
-    likely: Law
-    nominal: Solution
-    candidates: dict[tuple[str, ...], Candidate]
     selected: tuple[str, ...]
-    terms: list[tuple[Any, float]]
-
-    @property
-    def rest(self) -> float:
-        """Fall of -log p that all terms bring beyond the selected set."""
-        return sum(gain for _, gain in self.terms)
-
-    @property
-    def unexplained(self) -> float:
-        """The terms' share of all that is explained."""
-        return self.share(self.rest)
-
-    def share(self, rest: float) -> float:
-        """Share of some rest in it and what the selected set explains."""
-        return rest / max(self.candidates[self.selected].gain + rest, 1e-9)
 
 
 def search_effects(
@@ -110,12 +65,33 @@ def search_effects(
     found = _again(found, data)
     scores = _scores(data, found[()].solution, without)
     _try(found, data, found[()].solution, [n for n in _with_look_alikes(scores) if (n,) not in found], ())
-    selected = _exchange(found, data, _grow(found, data, without), without)
-    solution = found[selected].solution
+    now = Search(found, data, responses, again, _choose(found, data, without))
+    if sized:
+        now = _beside_rival(now, without)
+    solution = now.found[now.selected].solution
     # once more even for the same set: the law before came from a fit under the nominal one's noise, which is too large
-    again = resized(solution, data, responses, again, sized, LIKELY)
-    terms, beside = unexplained(data, solution, responses, again, sized)
-    return Finding(data, beside, again, found[()].solution, found, selected, terms)
+    likely = resized(solution, now.data, now.responses, now.law, sized, LIKELY)
+    terms, beside = unexplained(now.data, solution, now.responses, likely, sized)
+    return Finding(now.data, beside, likely, now.found[()].solution, now.found, now.selected, terms)
+
+
+def _beside_rival(now: Search, without: Collection[str]) -> Search:
+    """The search once more under the noise beside the best set of one effect more, if that is much less: the noise so
+    far had taken the effect up, and left it too little to gain."""
+    rival = _rival(now.found, now.selected)
+    if rival is None:
+        return now
+    law = resized(rival.solution, now.data, now.responses, now.law, sized=True)
+    if not is_quieter(law, now.law, TAKEN):
+        return now
+    data, responses = whiten(rival.solution, now.data.windows, now.data.use, law)
+    found = _again(now.found, data)
+    return Search(found, data, responses, law, _choose(found, data, without))
+
+
+def _choose(found: dict, data: Data, without: Collection[str]) -> tuple[str, ...]:
+    """The set that grows from the best single effect, each of it exchanged where another is better."""
+    return _exchange(found, data, _grow(found, data, without), without)
 
 
 def resized(solution: Solution, data: Data, responses: Responses, law: Law, sized: bool, worth: float = WORTH) -> Law:
@@ -157,11 +133,12 @@ def _try(found: dict, data: Data, begin: Solution, names: list[str], beside: tup
 def _refit_with_shapes(data: Data, vector: Array, starts: Array, effects: tuple[str, ...]) -> Solution:
     """A refit that first finds the size of the last effect: what only shapes it is lost until then."""
     shapes = tuple(pair for pair in SHAPES - STEPPED if pair[0] == effects[-1])
-    if shapes:
+    searched = next((pair for pair in (INSTANT, STEP) if pair[0] == effects[-1]), None)
+    if shapes or searched:
         first = refit(data, vector, starts, effects, shapes, most=4)
         vector, starts = first.vector, first.starts
-        if effects[-1] == "payload_change":
-            vector = at_best_instant(data, first)
+        if searched:
+            vector = at_best(data, first, searched)
     return refit(data, vector, starts, effects)
 
 
@@ -180,6 +157,14 @@ def _grow(found: dict, data: Data, without: Collection[str]) -> tuple[str, ...]:
             break
         selected = best.effects
     return selected
+
+
+def _rival(found: dict, selected: tuple[str, ...]) -> Candidate | None:
+    """The best set of one effect more, if it is worth its coordinates, whatever its form may cost."""
+    more = [c for e, c in found.items() if len(e) == len(selected) + 1 and set(selected) < set(e)]
+    best = max(more, key=lambda c: c.gain - c.price, default=None)
+    now = found[selected]
+    return best if best is not None and best.gain - best.price > now.gain - now.price + ENOUGH else None
 
 
 def _one_more(found: dict, data: Data, selected: tuple[str, ...], without: Collection[str]) -> None:

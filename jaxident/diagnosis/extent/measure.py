@@ -4,9 +4,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from jaxident.diagnosis.causes.candidates import Finding
 from jaxident.diagnosis.causes.search import Solution
 from jaxident.diagnosis.causes.unexplained import UNEXPLAINED
-from jaxident.diagnosis.causes.which import Finding
 from jaxident.diagnosis.extent.floor import REPLAYS, Floor, floor_of, wander_of
 from jaxident.diagnosis.extent.gap import deviations, early_inverse, ends_of, last_errors, settle
 from jaxident.diagnosis.extent.shrink import HIGH, LOW, Shrink, shrink_of

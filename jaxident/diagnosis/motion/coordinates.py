@@ -1,7 +1,8 @@
 """What a diagnosis searches over: the nominal robot and every effect, in coordinates with a derivative at neutral.
 
 A limit acts through its inverse, traction through the inverse square (tanh(c / L) L = c - c^3 / (3 L^2) + ...), a slope
-through its two components, a payload through what it makes accelerations lose.
+through its two components, a payload through what it makes accelerations lose, the centre of a lens through its product
+with the strength: of strength and centre many pairs bend the field nearly alike, of these coordinates few.
 """
 
 from collections.abc import Mapping
@@ -66,8 +67,8 @@ COORDINATES: dict[str, tuple[Coordinate, ...]] = {
     "camera_scale": (_signed("difference", 0.4),),
     "lens_distortion": (
         _signed("strength", 2.0),
-        Coordinate("centre_x", 0.0, -5.0, 5.0, 1.0),
-        Coordinate("centre_y", 0.0, -5.0, 5.0, 1.0),
+        Coordinate("pull_x", 0.0, -5.0, 5.0, 0.1),
+        Coordinate("pull_y", 0.0, -5.0, 5.0, 0.1),
     ),
     "camera_tilt": (_signed("along_x", 0.4), _signed("along_y", 0.4)),
 }
@@ -82,9 +83,11 @@ SMOOTH = tuple(
 STEPPED = {("input_quantisation", "step"), ("backlash", "coasting")}
 """Coordinates that poses follow in jumps, or that choose between two forms: looked for on a grid alone."""
 
-SHAPES = {("stiction", "fade"), ("payload_change", "instant"), ("lens_distortion", "centre_x"),
-          ("lens_distortion", "centre_y"), ("backlash", "coasting")}  # fmt: skip
-"""Coordinates that shape an effect and do nothing alone."""
+SHAPES = {("stiction", "fade"), ("payload_change", "instant"), ("backlash", "coasting")}
+"""Coordinates that shape an effect, whatever its size, and do nothing alone."""
+
+SILENT = SHAPES | {("lens_distortion", "pull_x"), ("lens_distortion", "pull_y")}
+"""Coordinates that do nothing alone."""
 
 PLACES = {
     (name, coordinate.name): len(NOMINAL) + place
@@ -138,6 +141,10 @@ def to_catalogue(name: str, values: Mapping[str, float]) -> dict[str, float]:
         }
     if name == "payload_change":
         return {"ratio": 1.0 / (1.0 - values["loss"]), "instant": float(values["instant"])}
+    if name == "lens_distortion":
+        strength = float(values["strength"])
+        x, y = (float(values[key]) / strength if strength else 0.0 for key in ("pull_x", "pull_y"))
+        return {"strength": strength, "centre_x": x, "centre_y": y}
     return {key: float(value) for key, value in values.items()}
 
 
@@ -152,6 +159,10 @@ def from_catalogue(name: str, values: Mapping[str, float]) -> dict[str, float]:
         return {"x": g * np.cos(angle), "y": g * np.sin(angle)}
     if name == "payload_change":
         return {"loss": 1.0 - 1.0 / values["ratio"], "instant": values["instant"]}
+    if name == "lens_distortion":
+        strength = values["strength"]
+        pulls = (strength * values.get(key, 0.0) for key in ("centre_x", "centre_y"))
+        return {"strength": strength, **dict(zip(("pull_x", "pull_y"), pulls, strict=True))}
     return {c.name: values.get(c.name, c.neutral) for c in COORDINATES[name]}
 
 

@@ -16,7 +16,7 @@ from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects import camera
 from jaxident.effects.contact import lateral_slip
 from jaxident.effects.drive import friction_level, mass_offset, quadratic_drag, slide, turn_loss
-from jaxident.numerics import hold_integrals, sin_cos, wrap
+from jaxident.numerics import hold_integrals, safe_divide, sin_cos, wrap
 from jaxident.robot.drive import Physical
 
 
@@ -55,7 +55,8 @@ def report(settings, states: Track) -> Pose:
     pose = Pose(states.x, states.y, states.theta)
     pose = camera.marker_offset(pose, **settings["marker_offset"])
     pose = camera.heading_offset(pose, **settings["heading_offset"])
-    pose = camera.lens_distortion(pose, **settings["lens_distortion"])
+    strength, *pull = settings["lens_distortion"].values()
+    pose = camera.lens_distortion(pose, strength, *(safe_divide(p, strength, 0.0) for p in pull))
     pose = camera.camera_tilt(pose, **settings["camera_tilt"])
     return camera.camera_scale(pose, **settings["camera_scale"])
 

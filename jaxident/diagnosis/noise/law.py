@@ -24,6 +24,17 @@ class Law(NamedTuple):
     coloured_time: float | None = None
 
 
+def is_quieter(law: Law, other: Law, part: float) -> bool:
+    """Whether some kind of noise has at most a part of its power in another law; slip counts at low frequency."""
+    return any(old > 0.0 and new < part * old for new, old in zip(_powers(law), _powers(other), strict=True))
+
+
+def _powers(law: Law) -> list[float]:
+    slip, coloured = law.slip or (0.0, 0.0), law.coloured or (0.0, 0.0)
+    slow = [deviation**2 * (law.slip_time or 0.0) for deviation in slip]
+    return [law.position**2, law.heading**2, *slow, *(deviation**2 for deviation in coloured)]
+
+
 def first_law(windows: Windows) -> Law:
     """Camera error by fourth differences of the poses, which motion hardly enters; the median forgives switches."""
     pose, seen = np.asarray(windows.pose), np.asarray(windows.seen)

@@ -9,6 +9,7 @@ from jaxident.diagnosis.causes.scores import seeded, seeds
 from jaxident.diagnosis.motion.coordinates import (
     COORDINATES,
     SHAPES,
+    SILENT,
     SMOOTH,
     from_catalogue,
     neutral_vector,
@@ -128,7 +129,7 @@ def _points(name: str, size: dict[str, float], duration: float) -> list[dict[str
 
 def _ray(vectors: list[np.ndarray], base: Array, name: str, point: dict[str, float]) -> list[int]:
     """Places of the vectors, appended to the others, in which one coordinate alone is at a point."""
-    shapes = {key: value for key, value in point.items() if (name, key) in SHAPES}
+    shapes = {key: value for key, value in point.items() if (name, key) in SILENT}
     places = []
     for c in COORDINATES[name]:
         if c.name in point and c.name not in shapes:

@@ -1,0 +1,76 @@
+"""Sets of effects as a search finds them: what each gains, what it must be worth, and where the search ended."""
+
+from collections.abc import Collection
+from typing import Any, NamedTuple
+
+from jaxident.diagnosis.causes.search import Data, Solution
+from jaxident.diagnosis.motion.coordinates import COORDINATES
+from jaxident.diagnosis.noise.law import Law
+from jaxident.effects.catalogue import CATALOGUE
+
+PENALTY = 4.0
+"""Fall of -log p that each coordinate of an effect costs."""
+ENOUGH = 9.0
+"""Gain beyond the penalty that claims an effect. With it a coordinate that does nothing gains as much once in three
+million times (chi-squared at 26), if the noise law is right; the rest is room for a law that is not quite."""
+FORM, ELSEWHERE = 0.01, 0.001
+"""Part of all that is explained which a further effect must bring at a site where the set has one already, and at
+another: a robot's own form of an effect is never quite that of the catalogue, and what it leaves looks like another one
+of the same site."""
+
+
+RIGID = ("marker_offset", "heading_offset")
+"""Effects that geometry gives one form, and that no other effect's form looks like."""
+
+
+class Candidate(NamedTuple):
+    """A set of effects refitted: its solution and its gain, the fall of -log p from the nominal fit."""
+
+    effects: tuple[str, ...]
+    solution: Solution
+    gain: float
+
+    @property
+    def price(self) -> float:
+        """That of its coordinates."""
+        return PENALTY * sum(len(COORDINATES[name]) for name in self.effects)
+
+    @property
+    def evidence(self) -> float:
+        """Gain less the price of its coordinates, and of what may only be the form of others."""
+        return self.gain - self.price - form_price(self.effects) * max(self.gain, 0.0)
+
+
+def form_price(effects: Collection[str]) -> float:
+    """Part of all that is explained which a set must bring beside its first effect."""
+    sites = [name if name in RIGID else CATALOGUE[name].site for name in effects]
+    distinct = len(set(sites))
+    return FORM * (len(sites) - distinct) + ELSEWHERE * max(distinct - 1, 0)
+
+
+class Finding(NamedTuple):
+    """Where the search ended: data under the noise law of the search; the law beside the corrector's terms, and the
+    likeliest one without them, which takes what they explain for noise; the nominal fit, all candidates of every stage
+    by their effects, the selected set, and terms of the corrector with what each still explains."""
+
+    data: Data
+    law: Law
+    likely: Law
+    nominal: Solution
+    candidates: dict[tuple[str, ...], Candidate]
+    selected: tuple[str, ...]
+    terms: list[tuple[Any, float]]
+
+    @property
+    def rest(self) -> float:
+        """Fall of -log p that all terms bring beyond the selected set."""
+        return sum(gain for _, gain in self.terms)
+
+    @property
+    def unexplained(self) -> float:
+        """The terms' share of all that is explained."""
+        return self.share(self.rest)
+
+    def share(self, rest: float) -> float:
+        """Share of some rest in it and what the selected set explains."""
+        return rest / max(self.candidates[self.selected].gain + rest, 1e-9)
