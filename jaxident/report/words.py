@@ -17,7 +17,7 @@ EFFECTS = {
     "input_rate_limit": "commands can change only so fast",
     "transport_delay": "commands act late, or the camera reports late",
     "motor_lag": "the motors take time to follow",
-    "backlash": "play in the gears, lost at each reversal",
+    "backlash": "play in the gears, crossed whenever the push turns round",
     "supply_sag": "the supply gives way when both motors draw",
     "lost_commands": "some commands never arrive",
     "coulomb_friction": "dry friction, the same at any speed",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxident.diagnosis.causes.lost import find_lost
-from jaxident.diagnosis.causes.rhythm import rhythms
+from jaxident.diagnosis.causes.rhythm import _travels, rhythms
 from jaxident.diagnosis.causes.scores import INSTANT, at_best, beginnings
 from jaxident.diagnosis.causes.scores import STEP as STEP_OF
 from jaxident.diagnosis.causes.search import Data, refit
@@ -144,6 +144,18 @@ def test_rhythms_of_wheels_are_found_with_their_price(plain):
     loud = rhythms(data, turning, responses)
     assert loud[0].period == pytest.approx(quiet[0].period, rel=0.1)
     assert gains(turning, loud)[0] > 9.0
+
+
+def test_rhythms_are_looked_for_along_the_modelled_path(plain):
+    """Travel measured with the camera's noise would explain that very noise."""
+    data, nominal = plain
+    residual = nominal.linear.residual
+    pose = data.windows.pose - residual.reshape(len(residual), -1, 3).transpose(1, 0, 2)
+    quiet = data._replace(windows=data.windows._replace(pose=pose))
+    fitted = nominal._replace(linear=nominal.linear._replace(residual=0.0 * residual))
+    for noisy, clean in zip(_travels(data, nominal), _travels(quiet, fitted), strict=True):
+        np.testing.assert_allclose(noisy.gone, clean.gone, atol=1e-9)
+        np.testing.assert_allclose(noisy.push, clean.push, atol=1e-9)
 
 
 def test_answers_are_what_least_squares_leaves_of_them(plain):
