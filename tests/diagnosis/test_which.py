@@ -1,9 +1,14 @@
 """Which set of effects is chosen, from candidates that are made up."""
 
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
 from jaxident.diagnosis.causes import which
 from jaxident.diagnosis.causes.candidates import ELSEWHERE, FORM, Candidate, form_price
+from jaxident.diagnosis.motion.coordinates import SIZE
+from jaxident.diagnosis.noise.law import Law
 
 FIRST, SECOND, OTHER = "turn_loss", "supply_sag", "transport_delay"
 
@@ -65,3 +70,20 @@ def test_the_rival_is_the_best_set_of_one_effect_more_whatever_its_form_costs():
     assert which._rival(found, (FIRST,)).effects == (FIRST, SECOND)
     found[FIRST, SECOND] = Candidate((FIRST, SECOND), None, 10_010.0)
     assert which._rival(found, (FIRST,)) is None
+
+
+def test_beside_a_rival_there_is_a_single_effect_left_to_grow_from(exchange, monkeypatch):
+    """However many larger sets are better: the search begins with one effect."""
+    costs = {(): 900.0, (FIRST,): 700.0, (SECOND,): 800.0, (FIRST, SECOND): 200.0}
+    costs |= {(FIRST, SECOND, name): 100.0 for name in ("slope", "motor_lag", "backlash", OTHER)}
+    monkeypatch.setattr(which, "refit", lambda data, vector, starts, effects: fit(effects))
+    monkeypatch.setattr(which, "resized", lambda *args, **options: Law(0.5, 1.0))
+    monkeypatch.setattr(which, "whiten", lambda *args: (data, None))
+    data = SimpleNamespace(windows=None, use=None)
+
+    def fit(effects):
+        return SimpleNamespace(cost=costs.get(tuple(effects), 850.0), vector=np.zeros(SIZE), starts=None)
+
+    found = {effects: Candidate(effects, fit(effects), 900.0 - cost) for effects, cost in costs.items()}
+    now = which.Search(found, data, None, Law(1.0, 1.0), (FIRST, SECOND))
+    assert set(which._beside_rival(now, ()).selected) >= {FIRST, SECOND}

@@ -85,7 +85,9 @@ def _beside_rival(now: Search, without: Collection[str]) -> Search:
     if not is_quieter(law, now.law, TAKEN):
         return now
     data, responses = whiten(rival.solution, now.data.windows, now.data.use, law)
-    found = _again(now.found, data)
+    first = max((effects for effects in now.found if len(effects) == 1), key=lambda e: now.found[e].evidence)
+    parts = [effects for effects in now.found if set(effects) <= set(rival.effects)]
+    found = _again(now.found, data, [first, *parts])  # else sets alone might be left, and none to grow from
     return Search(found, data, responses, law, _choose(found, data, without))
 
 
@@ -107,12 +109,12 @@ def whiten(solution: Solution, windows: Windows, use: Array, law: Law) -> tuple[
     return Data(windows, whitener_of(law, windows, responses), use), responses
 
 
-def _again(found: dict, data: Data) -> dict:
-    """The best candidates under another noise law, from where they were."""
+def _again(found: dict, data: Data, also: Collection[tuple[str, ...]] = ()) -> dict:
+    """The best candidates, and some others, under another noise law, from where they were."""
     nominal = refit(data, found[()].solution.vector, found[()].solution.starts, ())
     fresh: dict[tuple[str, ...], Candidate] = {(): Candidate((), nominal, 0.0)}
     order = sorted((effects for effects in found if effects), key=lambda effects: -found[effects].evidence)
-    for effects in order[:KEPT]:
+    for effects in dict.fromkeys([*order[:KEPT], *(e for e in also if e)]):
         candidate = found[effects]
         solution = refit(data, candidate.solution.vector, candidate.solution.starts, effects)
         fresh[effects] = Candidate(effects, solution, nominal.cost - solution.cost)
