@@ -51,9 +51,9 @@ def disturbed(effects, period, seen, rng):
             error[row] = kept * turn * error[row - 1] + np.sqrt(1.0 - kept**2) * error[row]
         seen = seen + error.real * [law["position"], law["position"], law["heading"]]
     if "outliers" in effects:
-        law = {"position": 0.05, "heading": 0.2} | effects["outliers"]
+        law = {"position": 0.05, "heading": 0.2, "form": 0.0} | effects["outliers"]
         hit = rng.random(rows) < law["probability"]
-        size = np.exp(law.get("form", 0.0) * rng.normal(size=(rows, 1))) if law.get("form") else 1.0
+        size = np.exp(law["form"] * rng.normal(size=(rows, 1))) if law["form"] else 1.0
         error = rng.normal(size=(rows, 3)) * size
         seen = seen + hit[:, None] * error * [law["position"], law["position"], law["heading"]]
     return seen

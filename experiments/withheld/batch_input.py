@@ -1,6 +1,6 @@
 """From commands to what the motors give, in plain NumPy: the input half of `batch_robot`.
 
-Each effect has two forms: that of `jaxident effects`, and where `form` is 1 another that a robot might have as well.
+Each effect has two forms: that of `jaxident effects`, and where `form` is not 0 another that robots might have too.
 """
 
 import numpy as np

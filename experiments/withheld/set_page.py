@@ -1,6 +1,7 @@
-"""One page for a set of robots of one make: what the diagnosis of each says, side by side.
+r"""One page for a set of robots of one make: what the diagnosis of each says, side by side.
 
-    python -m experiments.withheld.set_page --found real/create_*.json --title "Five Creates" --out creates.html
+    python -m experiments.withheld.set_page --found experiments/withheld/real/create_*.json \
+        --title "Five Creates" --out creates.html
 
 A cause that all robots of a make share should be named on each of them by itself; the page shows whether it is.
 """

@@ -121,7 +121,7 @@ ENTRIES = (
     Entry("mass_offset", "drive", "v' += c w^2, w' -= d v w",
           (Parameter("along", "m", 0.0, (-0.1, 0.1), 0.01), Parameter("heading", "1/m", 0.0, (-20.0, 20.0), 3.0)), BOTH,
           ("turn_loss",), "Fierro, Lewis 1998, Control of a nonholonomic mobile robot, IEEE TNN 9"),
-    Entry("turn_loss", "drive", "v' -= c |w| v", (Parameter("loss", "1/rad", 0.0, (0.0, 0.5), 0.1, least=0.0),),
+    Entry("turn_loss", "drive", "v' -= c |w| v", (Parameter("loss", "1/rad", 0.0, (0.0, 20.0), 0.1, least=0.0),),
           (ALONG,), ("quadratic_drag", "mass_offset"), "castor scrub; Wong 2008, Theory of Ground Vehicles, ch. 6"),
 )  # fmt: skip
 """Rows of the catalogue for this site."""

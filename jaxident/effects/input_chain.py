@@ -24,9 +24,8 @@ from jaxident.effects.time import dead_zone_drift, gain_drift
 
 NODES = (0.5 - math.sqrt(1.0 / 12.0), 0.5 + math.sqrt(1.0 / 12.0))
 """Gauss-Legendre rule on [0, 1] with two nodes of weight 1/2: mean and first moment of a cubic are exact."""
-
-
 Speeds = Callable[[Wheels], Wheels]
+"""Speeds of the wheels in the middle of a substep under a push, both per wheel and in commands."""
 
 
 class Memory(NamedTuple):
@@ -54,7 +53,7 @@ def push(
     settings, dead_zone: Array, memory: Memory, target: Wheels, time: Array, step: Array, speeds: Speeds
 ) -> tuple[Push, Memory]:
     """The push of a substep from session time `time` [s] on, `step` [s] long, and what is remembered after it. speeds:
-    those of the wheels half a substep on under some push, in commands that hold them, for play."""
+    what the play asks for, first under the push without it, then under what passes."""
     command, wheels = _before_play(settings, dead_zone, memory.command, target, time, step)
     play, lagged = memory.play, memory.lagged
     if "backlash" in settings:

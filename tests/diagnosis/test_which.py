@@ -61,6 +61,8 @@ def test_what_may_be_the_form_of_another_costs_more():
 def test_three_effects_pay_for_each_beyond_the_first():
     assert form_price(()) == form_price((FIRST,)) == 0.0
     assert form_price((FIRST, SECOND, OTHER)) == pytest.approx(FORM + ELSEWHERE)
+    assert form_price(("heading_offset", "lens_distortion")) == ELSEWHERE, "one site, but geometry has one form"
+    assert form_price(("camera_tilt", "lens_distortion")) == FORM
 
 
 def test_the_rival_is_the_best_set_of_one_effect_more_whatever_its_form_costs():

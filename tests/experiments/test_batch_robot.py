@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 from support.reference_effects import simulate_reference
+from withheld.batch_camera import disturbed, mapped
+from withheld.batch_input import BURST, happens
 from withheld.batch_robot import NEUTRAL, OUTSIDE, simulate
 from withheld.robots import FORMS, form
 
@@ -74,3 +76,28 @@ def test_other_forms_are_other_and_alike():
     moved = np.abs(usual - plain).max(axis=(0, 2))
     ratio = dict(zip(mechanical, apart / moved, strict=True))
     assert all(0.01 < value < 10.0 for value in ratio.values()), ratio
+
+
+def test_bursts_last_and_have_the_same_share():
+    """Within five standard errors of the share, of rows that come in threes; no burst is shorter, but at the end."""
+    rows, chance = 60_000, 0.05
+    hit = happens(np.random.default_rng(1), rows, chance, bursts=1.0)
+    assert abs(hit.mean() - chance) < 5.0 * np.sqrt(3.0 * chance / rows) + chance**2
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], hit, [False]]).astype(int)))
+    assert np.diff(edges)[::2][:-1].min() == BURST
+
+
+def test_other_forms_of_the_camera():
+    """A lens of the other form bends the edge more and the middle less; a mast that sways swings back."""
+    far, near = np.array([[0.8, 0.0, 0.0]]), np.array([[0.1, 0.0, 0.0]])
+    usual, other = ({"lens_distortion": {"strength": 0.1, "form": value}} for value in (0.0, 0.16))
+    assert mapped(other, far)[0, 0] > mapped(usual, far)[0, 0]
+    assert mapped(other, near)[0, 0] < mapped(usual, near)[0, 0]
+    law = {"position": 1.0, "heading": 1.0, "correlation_time": 2.0}
+    errors = [
+        disturbed({"coloured_noise": law | {"form": value}}, 0.04, np.zeros((20_000, 3)), np.random.default_rng(2))
+        for value in (0.0, 0.5)
+    ]
+    half = [np.mean(error[25:] * error[:-25]) for error in errors]  # a second apart: half a swing
+    assert half[0] > 0.3
+    assert half[1] < -0.3

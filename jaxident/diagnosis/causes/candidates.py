@@ -17,10 +17,9 @@ FORM, ELSEWHERE = 0.01, 0.001
 """Part of all that is explained which a further effect must bring at a site where the set has one already, and at
 another: a robot's own form of an effect is never quite that of the catalogue, and what it leaves looks like another one
 of the same site."""
-
-
 RIGID = ("marker_offset", "heading_offset")
-"""Effects that geometry gives one form, and that no other effect's form looks like."""
+"""Effects that geometry gives one form: what they leave is not the form of theirs, so that beside them a further effect
+pays as at another site, and so do they beside others."""
 
 
 class Candidate(NamedTuple):

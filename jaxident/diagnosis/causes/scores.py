@@ -43,8 +43,6 @@ def seeds(name: str, duration: float, steps: Iterable[float] = STEPS) -> list[di
         return [{"right": s, "left": s, "fade": fade} for s, fade in ((0.05, 0.05), (0.15, 0.05), (0.1, 0.15))]
     if name == "payload_change":
         return [{"loss": 0.1, "instant": duration * part} for part in np.linspace(0.06, 0.94, 12)]
-    if name == "lens_distortion":
-        return [{"strength": LENS}]
     if name == "backlash":
         return [{}, {"right": 0.02, "left": 0.02, "coasting": 1.0}]
     return [{}]
@@ -143,11 +141,12 @@ def _promises(data: Data, solution: Solution, name: str, points) -> tuple[list[n
     columns = np.concatenate([solution.linear.slopes, change, solution.linear.residual[..., None]], axis=2)[data.use]
     products = gram(data.whitener[data.use], columns, solution.linear.starts[data.use]).products.sum(axis=0)
     base = list(range(len(solution.places)))
-    gains, parts = [], []
+    gains, parts, alone = [], [], left_over(products, base) - 0.5 * float(products[-1, -1])
     for k in range(len(points)):
-        gains.append(explained(products, base, [len(base) + k]))
         own, cross, scale = normal(products, [*base, len(base) + k])
-        parts.append(float(np.linalg.solve(own, cross)[-1] / scale[-1]))
+        size = np.linalg.solve(own, cross)
+        gains.append(alone + 0.5 * float(cross @ size))
+        parts.append(float(size[-1] / scale[-1]))
     return vectors, gains, parts
 
 

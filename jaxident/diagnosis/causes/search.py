@@ -10,6 +10,7 @@ from jaxident.diagnosis.motion.linear import Linear, follow, gram, linearise, no
 from jaxident.diagnosis.motion.windows import Windows
 
 MOST_STEPS = 20
+"""Of one refit; what fits arrives in two to nine, what crawls is mostly an effect that is not there."""
 ENOUGH = 0.05
 """Promised fall of -log p below which the search ends."""
 LONGEST = 0.5

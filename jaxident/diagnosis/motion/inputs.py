@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxident.array_types import Array
+from jaxident.array_types import Array, Wheels
 from jaxident.effects.actuation import (
     asymmetric_dead_zone,
     backlash,
@@ -18,9 +18,10 @@ from jaxident.effects.actuation import (
     input_saturation,
     motor_lag,
 )
+from jaxident.effects.substep import wheel_speeds
 from jaxident.effects.time import dead_zone_drift, gain_drift
 from jaxident.numerics import safe_divide
-from jaxident.robot.drive import Physical
+from jaxident.robot.drive import Physical, force
 
 PUSHING = (
     "asymmetric_dead_zone", "direction_gain", "input_saturation", "input_quantisation", "input_rate_limit",
@@ -151,18 +152,16 @@ def _remembered(settings, drive: Physical, asked: Push, part: Array) -> Push:
 def _played(width: Array, coasting: Array, drive: Physical, mean, slope, size) -> tuple[Array, Array]:
     """What passes the play: for a first part of some substeps no more than what lets the wheels coast, whose speeds are
     those of the nominal drive."""
-    (a, b), (c, d) = drive.gain
-    gain = jnp.array([[a, b], [c, d]])
-    inverse = jnp.linalg.inv(gain)
     decay = jnp.exp(-drive.rate * size)
 
     def body(carry, now):
         position, speeds = carry
         mean, own, decay = now
         across = speeds[:, ::-1] * drive.coupling
-        coasts = coasting * (speeds * drive.rate) @ inverse.T
+        coasts = coasting * jnp.stack(wheel_speeds(drive, *speeds.T), axis=-1)
         position, free = backlash(position, mean - coasts, own, width)
-        steady = ((free * coasts + (1.0 - free) * mean) @ gain.T + across) / drive.rate
+        pull = force(drive, Wheels(*(free * coasts + (1.0 - free) * mean).T))
+        steady = (jnp.stack(pull, axis=-1) + across) / drive.rate
         return (position, steady + (speeds - steady) * decay), (free, coasts)
 
     still = jnp.zeros_like(mean[0])

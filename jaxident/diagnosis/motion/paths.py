@@ -16,6 +16,7 @@ from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects import camera
 from jaxident.effects.contact import lateral_slip
 from jaxident.effects.drive import friction_level, mass_offset, quadratic_drag, slide, turn_loss
+from jaxident.effects.substep import wheel_speeds
 from jaxident.numerics import hold_integrals, safe_divide, sin_cos, wrap
 from jaxident.robot.drive import Physical
 
@@ -55,8 +56,8 @@ def report(settings, states: Track) -> Pose:
     pose = Pose(states.x, states.y, states.theta)
     pose = camera.marker_offset(pose, **settings["marker_offset"])
     pose = camera.heading_offset(pose, **settings["heading_offset"])
-    strength, *pull = settings["lens_distortion"].values()
-    pose = camera.lens_distortion(pose, strength, *(safe_divide(p, strength, 0.0) for p in pull))
+    strength, *pulls = (settings["lens_distortion"][key] for key in ("strength", "pull_x", "pull_y"))
+    pose = camera.lens_distortion(pose, strength, *(safe_divide(pull, strength, 0.0) for pull in pulls))
     pose = camera.camera_tilt(pose, **settings["camera_tilt"])
     return camera.camera_scale(pose, **settings["camera_scale"])
 
@@ -177,14 +178,8 @@ def _traction_loss(push: Array, inverse_square: Array) -> Array:
 def _friction(settings, drive: Physical, before, free, lags, lightness: Array) -> list[Array]:
     """Accelerations that dry friction takes over a substep."""
     (a, b), (c, d) = drive.gain
-    determinant = a * d - b * c
-
-    def wheels(v, w):
-        v, w = drive.rate[0] * v, drive.rate[1] * w
-        return Wheels((d * v - b * w) / determinant, (a * w - c * v) / determinant)
-
     once_v, once_w = lags[0].whole[1] * lightness, lags[1].whole[1] * lightness
-    right, left = wheels(a * once_v, c * once_w), wheels(b * once_v, d * once_w)
+    right, left = (wheel_speeds(drive, p * once_v, q * once_w) for p, q in ((a, c), (b, d)))
     mobility = (right.right, left.right), (right.left, left.left)
     coulomb, stiction = settings["coulomb_friction"], settings["stiction"]
 
@@ -192,4 +187,4 @@ def _friction(settings, drive: Physical, before, free, lags, lightness: Array) -
         sides = zip(n, Wheels._fields, strict=True)
         return Wheels(*(friction_level(m, coulomb[side], stiction[side], stiction["fade"]) for m, side in sides))
 
-    return _force(drive, slide(wheels(*before), wheels(*free), mobility, level))
+    return _force(drive, slide(wheel_speeds(drive, *before), wheel_speeds(drive, *free), mobility, level))
