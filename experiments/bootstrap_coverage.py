@@ -39,13 +39,13 @@ NOISES = {
 WHITE = Law()
 
 
-@functools.partial(jax.jit, static_argnames=("rows", "runs"))
-def record(key, noise, rows, runs):
+@functools.partial(jax.jit, static_argnames=("rows", "runs", "excitation"))
+def record(key, noise, rows, runs, excitation="multilevel"):
     """Runs (runs, rows) of one robot, each from rest on an input of its own."""
 
     def one(key):
         key, own = jax.random.split(key)
-        command, unit = EXCITATIONS["multilevel"](key, rows), draw_noise(own, rows)
+        command, unit = EXCITATIONS[excitation](key, rows), draw_noise(own, rows)
         model = dataclasses.replace(ROBOT, noise=noise)
         state = run_physical(model, command, jnp.asarray(PERIOD), AT_REST, unit)
         return command, observe(state.pose, noise, unit, jnp.asarray(PERIOD))

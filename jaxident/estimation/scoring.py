@@ -18,15 +18,13 @@ from jaxident.estimation.runs import Runs, run_axes
 
 START_STATES = 5
 FIRST_DAMPING, EASE, STIFFEN = 1e-3, 0.1, 10.0
-LARGEST_DAMPING = 1e12
+LEAST_DAMPING, LARGEST_DAMPING = 1e-6, 1e12
 FLAT = 1e-13
 TOLERANCE = 1e-7
 """Expected fall of -log p below which the search ends: a step of 4e-4 standard deviations."""
 KINK_STEP, KINK_TOLERANCE = 1e-2, 1e-4
 """At a kink: steps of dead zones below this many standard deviations fail, and the rest promises less than this."""
 DEAD_ZONES = slice(6, 8)
-STUCK, LOOSENED = 1e4, 1e-8
-"""Damping from which a search counts as stuck at a kink of a dead zone, and the factor that loosens all others then."""
 LONGEST_LOG_STEP, LONGEST_SHARE = 1.5, 0.25
 """A step changes a logarithm by at most this much, and a dead zone by this share of its bound."""
 
@@ -49,13 +47,25 @@ class Local(NamedTuple):
     between: Any
 
 
+class Damping(NamedTuple):
+    """Of the dead zones' part of a step, and of all other unknowns', relative to the curvature.
+
+    Apart, because a step of a dead zone across a level of the commands, where the cost has a kink, fails however near
+    the optimum all others are: damped alike they would hardly move while it is shortened.
+    """
+
+    dead_zones: Any
+    others: Any
+
+
 class Search(NamedTuple):
-    """Where a search stands: its best point, the curvature there, the point to look at next, damping, steps taken,
-    whether it has arrived."""
+    """Where a search stands: its best point, the curvature there, the point to look at next and whether its dead zones
+    are held as they were, damping, steps taken, whether it has arrived."""
 
     point: Point
     local: Local
     proposed: Point
+    holding: Any
     damping: Any
     steps: Any
     arrived: Any
@@ -133,19 +143,16 @@ def rescale(point: Point, runs: Runs, law: Law) -> Point:
     return point._replace(shared=jnp.clip(moved, low, high))
 
 
-def eliminate(local: Local, damping: Array, held: Array) -> tuple[Array, Array, Array]:
+def eliminate(local: Local, damping: Damping, held: Array) -> tuple[Array, Array, Array]:
     """The curvature of the shared unknowns with the start states eliminated, its gradient, and the elimination
-    (runs, 5, unknowns + 1); `held` unknowns (unknowns,) stay where they are.
-
-    Where damping has grown past STUCK a dead zone sits at a kink: it alone stays damped, and the rest moves on.
-    """
+    (runs, 5, unknowns + 1); `held` unknowns (unknowns,) stay where they are."""
     free = jnp.where(held, 0.0, 1.0)
     shared = local.shared * free[:, None] * free + jnp.diag(1.0 - free)
-    gentle = jnp.where(damping < STUCK, damping, damping * LOOSENED)
-    own = jnp.full(len(held), gentle).at[DEAD_ZONES].set(damping)
+    own = jnp.full(len(held), damping.others).at[DEAD_ZONES].set(damping.dead_zones)
     shared = shared + jnp.diag(own * jnp.diagonal(shared))
     diagonal = jnp.diagonal(local.starts, axis1=1, axis2=2)
-    starts = local.starts + jax.vmap(jnp.diag)(gentle * diagonal + 1e-12 * jnp.max(diagonal, axis=1, keepdims=True))
+    own = damping.others * diagonal + 1e-12 * jnp.max(diagonal, axis=1, keepdims=True)
+    starts = local.starts + jax.vmap(jnp.diag)(own)
     between = local.between * free[:, None]
     right = jnp.concatenate([between.transpose(0, 2, 1), local.gradient.starts[:, :, None]], axis=2)
     solved = jnp.linalg.solve(starts, right)
@@ -153,7 +160,7 @@ def eliminate(local: Local, damping: Array, held: Array) -> tuple[Array, Array, 
     return shared - reduced[:, :-1], free * local.gradient.shared - reduced[:, -1], solved
 
 
-def newton(local: Local, damping: Array, held: Array) -> tuple[Array, Array, Array]:
+def newton(local: Local, damping: Damping, held: Array) -> tuple[Array, Array, Array]:
     """The step in the shared unknowns and the start states with some unknowns held, and the fall it promises."""
     shared, gradient, solved = eliminate(local, damping, held)
     step = -jnp.linalg.solve(shared, gradient)
@@ -162,26 +169,39 @@ def newton(local: Local, damping: Array, held: Array) -> tuple[Array, Array, Arr
     return step, starts, promised
 
 
-def propose(point: Point, local: Local, damping: Array, law: Law, low: Array, high: Array) -> tuple[Point, Array]:
-    """The damped step from a point, shortened where it is long and cut at the bounds, and whether the point is a
-    minimum.
+def propose(search: Search, failed: Array, law: Law, low: Array, high: Array) -> tuple[Point, Array, Array]:
+    """The damped step from a search's point, shortened where it is long and cut at the bounds; whether it holds the
+    dead zones, as it does after a whole step that failed while the others alone promise something; and whether the
+    point is a minimum.
 
     It is one where the whole step promises next to nothing, or at a kink: where a dead zone meets a level of the
     commands the cost has two slopes. Both may point up, so that ever smaller steps of the dead zone fail while all
     other unknowns are at rest.
     """
+    point, local, damping = search.point, search.local, search.damping
     slope = local.gradient.shared
     held = ((point.shared <= low) & (slope > 0.0)) | ((point.shared >= high) & (slope < 0.0))
-    step, starts, promised = newton(local, damping, held)
+    whole, whole_starts, promised = newton(local, damping, held)
+    others, others_starts, rest = newton(local, damping, held.at[DEAD_ZONES].set(True))
+    holding = failed & (rest > KINK_TOLERANCE)
+    step, starts = (jnp.where(holding, a, b) for a, b in ((others, whole), (others_starts, whole_starts)))
     longest = jnp.where(is_logarithmic(law), LONGEST_LOG_STEP, jnp.inf)
     longest = longest.at[DEAD_ZONES].set(LONGEST_SHARE * high[DEAD_ZONES])
     part = jnp.minimum(1.0, jnp.min(longest / jnp.maximum(jnp.abs(step), 1e-300)))
-    moved = jnp.clip(point.shared + part * step, low, high)
-    level = (promised >= 0.0) & (promised < TOLERANCE) & (damping <= FIRST_DAMPING)
-    _, _, others = newton(local, jnp.asarray(1e-9), held.at[DEAD_ZONES].set(True))
-    tiny = jnp.abs(step) * jnp.sqrt(jnp.diagonal(local.shared)) < KINK_STEP
-    kink = (others >= 0.0) & (others < KINK_TOLERANCE) & jnp.all(tiny[DEAD_ZONES])
-    return Point(moved, point.starts + part * starts), level | kink
+    moved = Point(jnp.clip(point.shared + part * step, low, high), point.starts + part * starts)
+    level = (promised >= 0.0) & (promised < TOLERANCE) & (damping.dead_zones <= FIRST_DAMPING)
+    tiny = jnp.abs(whole) * jnp.sqrt(jnp.diagonal(local.shared)) < KINK_STEP
+    kink = (rest >= 0.0) & (rest * (1.0 + damping.others) < KINK_TOLERANCE) & jnp.all(tiny[DEAD_ZONES])
+    return moved, holding, level | kink
+
+
+def adapt(damping: Damping, better: Array, holding: Array) -> Damping:
+    """Less damping of what moved and did well, more of what moved and did not; of all unknowns a whole step blames the
+    dead zones first."""
+    others = damping.others * jnp.where(better, EASE, jnp.where(holding, STIFFEN, 1.0))
+    dead_zones = damping.dead_zones * jnp.where(holding, 1.0, jnp.where(better, EASE, STIFFEN))
+    others = jnp.maximum(others, LEAST_DAMPING)
+    return Damping(jnp.maximum(dead_zones, others), others)
 
 
 def search_from(point: Point, runs: Runs, law: Law, d_max: Array, most: int) -> Search:
@@ -193,24 +213,19 @@ def search_from(point: Point, runs: Runs, law: Law, d_max: Array, most: int) -> 
         local = local_at(there, runs, law)
         better = (local.value <= search.local.value) | (search.steps == 0)
         point, local = jax.tree.map(lambda a, b: jnp.where(better, a, b), (there, local), (search.point, search.local))
-        damping = jnp.maximum(search.damping * jnp.where(better, EASE, STIFFEN), 1e-6)
-        proposed, arrived = propose(point, local, damping, law, low, high)
-        return Search(point, local, proposed, damping, search.steps + 1, arrived)
+        damping = adapt(search.damping, better, search.holding)
+        search = search._replace(point=point, local=local, damping=damping, steps=search.steps + 1)
+        proposed, holding, arrived = propose(search, ~better & ~search.holding, law, low, high)
+        return search._replace(proposed=proposed, holding=holding, arrived=arrived)
 
     def walking(search):
-        return ~search.arrived & (search.steps < most) & (search.damping < LARGEST_DAMPING)
+        return ~search.arrived & (search.steps < most) & (search.damping.others < LARGEST_DAMPING)
 
-    unknown, inf = len(names(law)), jnp.asarray(jnp.inf)
-    runs_count = len(point.starts)
-    nothing = Local(
-        inf,
-        jax.tree.map(jnp.zeros_like, point),
-        jnp.zeros((unknown, unknown)),
-        jnp.zeros((runs_count, START_STATES, START_STATES)),
-        jnp.zeros((runs_count, unknown, START_STATES)),
-    )
-    first = Search(point, nothing, point, jnp.asarray(FIRST_DAMPING), jnp.asarray(0), jnp.asarray(False))
-    return jax.lax.while_loop(walking, body, first)
+    unknown, count = len(names(law)), len(point.starts)
+    shapes = (unknown, unknown), (count, START_STATES, START_STATES), (count, unknown, START_STATES)
+    nothing = Local(jnp.asarray(jnp.inf), jax.tree.map(jnp.zeros_like, point), *map(jnp.zeros, shapes))
+    damping, no = Damping(*jnp.full(2, FIRST_DAMPING)), jnp.asarray(False)
+    return jax.lax.while_loop(walking, body, Search(point, nothing, point, no, damping, jnp.asarray(0), no))
 
 
 def covariance_at(point: Point, local: Local, law: Law) -> Array:
@@ -220,7 +235,7 @@ def covariance_at(point: Point, local: Local, law: Law) -> Array:
     Directions that the data do not determine get a finite, enormous variance (curvature floored at FLAT of the largest,
     all unknowns scaled alike).
     """
-    shared, _, _ = eliminate(local, jnp.asarray(0.0), jnp.zeros(len(names(law)), bool))
+    shared, _, _ = eliminate(local, Damping(0.0, 0.0), jnp.zeros(len(names(law)), bool))
     scale = jnp.sqrt(jnp.diagonal(local.shared))
     scale = jnp.where(scale > 0.0, scale, 1.0)
     values, vectors = jnp.linalg.eigh(shared / scale[:, None] / scale)
