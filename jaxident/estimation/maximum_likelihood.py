@@ -12,12 +12,15 @@ from jaxident.estimation.parameters import Law, Robot, from_vector, to_vector
 from jaxident.estimation.runs import Runs, cut_windows, run_axes
 from jaxident.estimation.scoring import Point, Search, covariance_at, search_from
 from jaxident.estimation.starter import Start, first_estimate, start_states
+from jaxident.numerics import in_blocks
 from jaxident.robot.drive import Physical
 from jaxident.robot.noise import Noise
 
 WINDOW = 200
 """Rows of the windows that the starter fits: long enough for a slow pole, too short for slip to pile up."""
 MOST_STEPS = 40
+BLOCK = 4
+"""Trials of a batch whose starters run at once: the paths of more leave the second-level cache."""
 WHITE = Law()
 
 
@@ -49,6 +52,10 @@ class Beginning(NamedTuple):
 @partial(jax.jit, static_argnames=("window",))
 def begin(runs: Runs, d_max: Array, window: int = WINDOW) -> Beginning:
     """The starter's estimate on windows of some rows of the runs (runs, rows)."""
+    return in_blocks(partial(_begin, window=window), BLOCK)(runs, jnp.asarray(d_max))
+
+
+def _begin(runs: Runs, d_max: Array, window: int) -> Beginning:
     windows = cut_windows(runs, min(window, runs.seen.shape[1]))
     estimate = first_estimate(windows, d_max)
     per_run = windows.seen.shape[0] // runs.seen.shape[0]

@@ -24,10 +24,12 @@ SLOWEST, FASTEST = 0.25, 2.5
 
 
 class Channel(NamedTuple):
-    """One channel of windows (windows, rows): measured coordinates (windows, rows, coordinates), the direction in which
-    a path counts (windows, rows, coordinates), and weights 1 or 0 (windows, rows)."""
+    """One channel of windows, rows first as scans take them: measured coordinates (rows, coordinates, windows) less
+    their mean (coordinates, windows) over each window, the direction in which a path counts (rows, coordinates,
+    windows), and weights 1 or 0 (rows, windows)."""
 
     measured: Any
+    mean: Any
     direction: Any
     weight: Any
 
@@ -52,7 +54,7 @@ def first_estimate(windows: Runs, d_max: Array) -> Start:
     """The best of two grids over dead zones in [0, d_max] and rates; windows (windows, rows)."""
     pair = channels(windows)
     rows, step = windows.seen.shape[1], jnp.mean(windows.step)
-    counts = jnp.stack([jnp.sum(c.weight) * c.measured.shape[-1] for c in pair])
+    counts = jnp.stack([jnp.sum(c.weight) * c.measured.shape[1] for c in pair])
 
     def look(grid, finer):
         """The best of a grid (rates (2, RATES), widths (2, WIDTHS)), and the next grid around it."""
@@ -77,9 +79,20 @@ def channels(windows: Runs) -> tuple[Channel, Channel]:
     turn = jnp.diff(heading, axis=1, append=heading[:, -1:])
     sine, cosine = sin_cos(heading + 0.5 * turn)
     chord = jnp.sinc(turn / (2.0 * jnp.pi))
-    position = jnp.stack([windows.pose.x, windows.pose.y], axis=-1)
-    along = Channel(position, jnp.stack([chord * cosine, chord * sine], axis=-1), seen.astype(float))
-    return along, Channel(heading[..., None], jnp.ones_like(heading)[..., None], seen.astype(float))
+
+    def channel(measured, direction):
+        measured, direction = (jnp.moveaxis(jnp.stack(part), 2, 0) for part in (measured, direction))
+        weight = seen.T.astype(float)
+        mean = _mean(weight, measured)
+        return Channel(measured - mean, mean, direction, weight)
+
+    along = channel([windows.pose.x, windows.pose.y], [chord * cosine, chord * sine])
+    return along, channel([heading], [jnp.ones_like(heading)])
+
+
+def _mean(weight: Array, columns: Array) -> Array:
+    """Mean (..., windows) over weighted rows of columns (rows, ..., windows)."""
+    return jnp.einsum("rw,r...w->...w", weight, columns) / jnp.maximum(jnp.sum(weight, axis=0), 1.0)
 
 
 def _bridge(theta: Array, seen: Array) -> Array:
@@ -131,22 +144,26 @@ def _fit(channel: Channel, windows: Runs, rates: Array, grid: Array) -> Fits:
 
 def _products(channel: Channel, step: Array, pull: Array, rate: Array) -> Array:
     """Inner products (columns + 1, columns + 1) at one rate of the paths that accelerations (rows, windows, columns)
-    cause and, last, of the data; start position and start speed of every window projected out."""
-    measured, direction = (jnp.moveaxis(part, 0, 1)[:, :, None] for part in (channel.measured, channel.direction))
-    weight = channel.weight.T[:, :, None, None]
-    table = jnp.concatenate([_lay(rate, step, pull, direction), measured], axis=2)
-    mean = jnp.sum(weight * table, axis=0) / jnp.maximum(jnp.sum(weight, axis=0), 1.0)
-    table = weight * (table - mean)
-    coast = table[:, :, :1]
-    power = jnp.sum(coast**2, axis=(0, 3), keepdims=True)
-    share = safe_divide(jnp.sum(coast * table, axis=(0, 3), keepdims=True), power, jnp.zeros(()))
-    free = jnp.moveaxis(table - share * coast, 2, 0)[1:].reshape(table.shape[2] - 1, -1)
-    return free @ free.T
+    cause and, last, of the data; start position and start speed of every window projected out.
+
+    The projections are made on the products: made on the paths themselves they pass through memory again and again.
+    """
+    weight = channel.weight[:, None]
+    table = weight[..., None] * _lay(rate, step, pull, channel.direction)
+    table = jnp.concatenate([table, (weight * channel.measured)[..., None]], axis=-1).transpose(2, 3, 1, 0)
+    sums = jnp.sum(table, axis=3)
+    table = table.reshape(*table.shape[:2], -1)
+    products = table @ table.swapaxes(1, 2)
+    count = jnp.maximum(jnp.sum(channel.weight, axis=0), 1.0)[:, None, None]
+    products = products - sums @ sums.swapaxes(1, 2) / count
+    coast = products[:, :1]
+    share = safe_divide(coast, coast[:, :, :1], jnp.zeros(()))
+    return jnp.sum(products - share.swapaxes(1, 2) * coast, axis=0)[1:, 1:]
 
 
 def _lay(rate: Array, step: Array, pull: Array, direction: Array) -> Array:
-    """Coordinates (rows, windows, 1 + columns, coordinates) of paths laid along a direction per row (rows, windows, 1,
-    coordinates): first of coasting from speed 1, then from rest under accelerations (rows, windows, columns)."""
+    """Coordinates (rows, coordinates, windows, 1 + columns) of paths laid along a direction per row (rows,
+    coordinates, windows): first of coasting from speed 1, then from rest under accelerations (rows, windows, columns)."""
     even = jnp.ndim(step) == 0
     shared = hold_integrals(rate, step)
     pull = jnp.concatenate([jnp.zeros_like(pull[..., :1]), pull], axis=-1)
@@ -155,13 +172,12 @@ def _lay(rate: Array, step: Array, pull: Array, direction: Array) -> Array:
         speed, place = now
         own, pull, direction = row
         decay, once, twice = shared if even else own
-        moved = place + (once * speed + twice * pull)[..., None] * direction
+        moved = place + (once * speed + twice * pull) * direction[..., None]
         return (decay * speed + once * pull, moved), place
 
     first = jnp.zeros(pull.shape[1:]).at[:, 0].set(1.0)
-    return jax.lax.scan(
-        body, (first, jnp.zeros((*first.shape, direction.shape[-1]))), (None if even else shared, pull, direction)
-    )[1]
+    place = jnp.zeros((direction.shape[1], *first.shape))
+    return jax.lax.scan(body, (first, place), (None if even else shared, pull, direction))[1]
 
 
 def start_states(start: Start, windows: Runs) -> Array:
@@ -170,17 +186,15 @@ def start_states(start: Start, windows: Runs) -> Array:
     passed = [dead_zone(u.T, width) for u, width in zip(windows.command, start.dead_zone, strict=True)]
 
     def of_channel(channel, row):
-        measured, direction = (jnp.moveaxis(part, 0, 1)[:, :, None] for part in (channel.measured, channel.direction))
-        weight = channel.weight.T[:, :, None, None]
+        weight = channel.weight
         pull = sum(gain * m for gain, m in zip(start.gain[row], passed, strict=True))[..., None]
-        laid = _lay(start.rate[row], step, pull, direction)
-        coast, rest = laid[:, :, :1], measured - laid[:, :, 1:]
-        count = jnp.maximum(jnp.sum(weight, axis=0), 1.0)
-        mean_coast, mean_rest = (jnp.sum(weight * part, axis=0) / count for part in (coast, rest))
-        centred = weight * (coast - mean_coast)
-        power = jnp.sum(centred**2, axis=(0, 3))
-        speed = safe_divide(jnp.sum(centred * rest, axis=(0, 3)), power, jnp.zeros(()))
-        return mean_rest[:, 0] - speed * mean_coast[:, 0], speed
+        laid = _lay(start.rate[row], step, pull, channel.direction)
+        coast, rest = laid[..., 0], channel.measured - laid[..., 1]
+        mean_coast, mean_rest = _mean(weight, coast), _mean(weight, rest)
+        centred = weight[:, None] * (coast - mean_coast)
+        power = jnp.sum(centred**2, axis=(0, 1))
+        speed = safe_divide(jnp.sum(centred * rest, axis=(0, 1)), power, jnp.zeros(()))
+        return channel.mean + mean_rest - speed * mean_coast, speed[None]
 
     (position, v), (heading, w) = (of_channel(channel, row) for row, channel in enumerate(channels(windows)))
-    return jnp.concatenate([position, heading, v, w], axis=1)
+    return jnp.concatenate([position, heading, v, w]).T

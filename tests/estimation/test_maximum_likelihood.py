@@ -83,6 +83,13 @@ def test_errors_stay_near_the_bound_and_intervals_cover():
     assert np.mean(np.abs(over_own[:, :8]) < 1.96) > 0.89
 
 
+def test_a_dead_zone_on_a_level_of_the_input_is_arrived_at():
+    """The left wheel's dead zone lies on a level of the staircase, where the cost has a kink."""
+    _, over_own, ok = trials("staircase", Noise(1e-3, 1e-2), Law(), 48)
+    assert ok.all()
+    assert np.mean(np.abs(over_own[:, 7]) < 1.96) > 0.8
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["multilevel", "staircase"])
 @pytest.mark.parametrize("millimetres", [0.2, 0.5, 1.0, 2.0, 5.0])
