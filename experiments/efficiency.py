@@ -82,7 +82,11 @@ def main() -> None:
         for excitation in ("multilevel", "staircase")
         for level in options.levels
     ]
-    cells += [("multilevel", f"{law}, 1 mm", NOISES[law], law, fitted) for law in ("ar0.9", "slip") for fitted in (law, "white")]
+    cells += [
+        ("multilevel", f"{law}, 1 mm", NOISES[law], law, fitted)
+        for law in ("ar0.9", "slip")
+        for fitted in (law, "white")
+    ]
     for excitation, label, noise, truth, fitted in cells:
         rows.append([excitation, label, fitted, *judge(options.seeds, noise, excitation, LAWS[truth], LAWS[fitted])])
         print(" | ".join(rows[-1]), flush=True)

@@ -162,8 +162,8 @@ def _products(channel: Channel, step: Array, pull: Array, rate: Array) -> Array:
 
 
 def _lay(rate: Array, step: Array, pull: Array, direction: Array) -> Array:
-    """Coordinates (rows, coordinates, windows, 1 + columns) of paths laid along a direction per row (rows,
-    coordinates, windows): first of coasting from speed 1, then from rest under accelerations (rows, windows, columns)."""
+    """Coordinates (rows, coordinates, windows, 1 + columns) of paths laid along a direction per row (rows, coordinates,
+    windows): first of coasting from speed 1, then from rest under accelerations (rows, windows, columns)."""
     even = jnp.ndim(step) == 0
     shared = hold_integrals(rate, step)
     pull = jnp.concatenate([jnp.zeros_like(pull[..., :1]), pull], axis=-1)

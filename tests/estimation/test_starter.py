@@ -44,7 +44,9 @@ def test_start_states_fit_a_coasting_robot(windows):
     """Without forces heading and position follow from the first state alone."""
     time = STEP * np.arange(ROWS)
     turned = 0.4 * (1.0 - np.exp(-RATE * time)) / RATE
-    pose = Pose(*(jnp.tile(jnp.asarray(c), (WINDOWS, 1)) for c in (np.full(ROWS, 1.5), np.full(ROWS, -2.0), 0.3 + turned)))
+    pose = Pose(
+        *(jnp.tile(jnp.asarray(c), (WINDOWS, 1)) for c in (np.full(ROWS, 1.5), np.full(ROWS, -2.0), 0.3 + turned))
+    )
     still = windows._replace(pose=pose, command=Wheels(*jnp.zeros((2, WINDOWS, ROWS))))
     begin = starter.Start(jnp.full(2, RATE), jnp.ones((2, 2)), jnp.zeros(2), jnp.ones(2))
     found = starter.start_states(begin, still)
