@@ -30,9 +30,10 @@ NOTES = {
 @click.option(
     "--noise-law",
     type=click.Choice(["white", "ar1", "slip", "slip-ar1", "auto"]),
-    default="white",
+    default="auto",
     show_default=True,
-    help="What is random: white camera error, one with a memory, slip of the wheels; auto tries them (minutes).",
+    help="What is random: white camera error, one with a memory, slip of the wheels; auto tries them in turn while the "
+    "residuals are coloured.",
 )
 @click.option(
     "--setup-time", type=click.FloatRange(0, min_open=True), metavar="S", help="Seconds for the start values (paper)."

@@ -62,7 +62,7 @@ def identify(
     logs: Log | Sequence[Log],
     method: str = "maximum-likelihood",
     *,
-    noise_law: str = "white",
+    noise_law: str = "auto",
     coupling: bool = False,
     setup_time: float | None = None,
     forgetting: float | None = None,
@@ -72,11 +72,12 @@ def identify(
     """The model of the robot behind one or several logs, runs in the order given.
 
     method "maximum-likelihood": physical parameters from whole runs, uneven or not, under a noise_law "white", "ar1",
-    "slip", "slip-ar1" or "auto"; with `coupling` of the two speeds if asked for. method "paper": batch initialisation
-    on the setup time (section VI), then recursive least squares (15)-(18) over the rest of an even log. Its settings:
-    setup_time [s] from the start (default: 200 samples or three tenths, whichever is more); forgetting in (0, 1]
-    (default 1); reading of (21): "one_step" (default), as the recursion reads it and best on real robots, or
-    "free_run". methods "instrumental-variables" (one even run without gaps) and "key-term-least-squares" (even runs):
+    "slip", "slip-ar1" or, by default, "auto": white unless its residuals are coloured, then the likeliest; with
+    `coupling` of the two speeds if asked for. method "paper": batch initialisation on the setup time (section VI), then
+    recursive least squares (15)-(18) over the rest of an even log. Its settings: setup_time [s] from the start
+    (default: 200 samples or three tenths, whichever is more); forgetting in (0, 1] (default 1); reading of (21):
+    "one_step" (default), as the recursion reads it and best on real robots, or "free_run". methods
+    "instrumental-variables" (one even run without gaps) and "key-term-least-squares" (even runs):
     yardsticks, the same equations from all samples at once. d_max bounds the dead zones [unit of the command] (default:
     0.9 of the largest command). Needs double precision; InputError says what a log lacks, WorkError that the result is
     not finite.

@@ -1,18 +1,18 @@
 """From logs to a model by maximum likelihood on poses."""
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxident.array_types import Pose
+from jaxident.array_types import Array, Pose
 from jaxident.errors import InputError, WorkError
 from jaxident.estimation.maximum_likelihood import Fit
-from jaxident.estimation.noise_law import WHITE, fit_law
+from jaxident.estimation.noise_law import WHITE, colour, fit_law
 from jaxident.estimation.parameters import Law, names, to_vector
 from jaxident.estimation.precision import difference_covariance, spread_of
-from jaxident.estimation.residual_tests import whiteness
 from jaxident.estimation.runs import Runs, stack_runs
 from jaxident.estimation.suspicions import log_suspicions
 from jaxident.log import Log
@@ -48,7 +48,7 @@ def identify_poses(log: Log, d_max: float, noise_law: str, coupling: bool) -> Po
     if not all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves((fit.robot, fit.covariance))):
         raise WorkError("the maximum-likelihood estimate is not finite: the log does not determine the model")
     deviation = np.sqrt(np.diagonal(np.asarray(fit.covariance))[2:6]).reshape(2, 2)
-    suspicions = (*_suspicions(fit, runs), *log_suspicions(log, fit.robot, deviation))
+    suspicions = (*_suspicions(fit, runs, noise_law), *log_suspicions(log, fit.robot, deviation))
     return PoseFit(_model(fit, law, float(np.median(_steps(log)))), _residuals(fit, runs, log), fit, law, suspicions)
 
 
@@ -67,7 +67,7 @@ def _steps(log: Log) -> np.ndarray:
 
 def _model(fit: Fit, law: Law, period: float) -> Model:
     """The estimate as a model with its noise law, covariance and standard deviations."""
-    difference = difference_covariance(to_vector(fit.robot, law), fit.covariance, period, law)
+    difference = _difference_covariance(fit, period, law)
     drive, noise = fit.robot.drive, fit.robot.noise
     coupling = None if drive.coupling is None else np.asarray(drive.coupling)
     return Model(
@@ -82,20 +82,25 @@ def _model(fit: Fit, law: Law, period: float) -> Model:
     )
 
 
-def _suspicions(fit: Fit, runs: Runs) -> tuple[str, ...]:
+@partial(jax.jit, static_argnames="law")
+def _difference_covariance(fit: Fit, period: Array, law: Law) -> Array:
+    return difference_covariance(to_vector(fit.robot, law), fit.covariance, period, law)
+
+
+def _suspicions(fit: Fit, runs: Runs, noise_law: str) -> tuple[str, ...]:
     """A line where the residuals are not white: the intervals are then too narrow."""
-    found = float(np.sum(whiteness(fit.innovations.normalised, runs.seen)))
+    found = colour(fit, runs)
     if found < WHITE:
         return ()
-    return (
-        f"residuals are coloured ({found:.0f}, white ones below {WHITE}): intervals are too narrow; "
-        "the noise law 'auto' tries slip and a camera error with a memory",
-    )
+    tried = "no noise law makes them white, so the model lacks something: `jaxident diagnose` looks for it"
+    other = "the noise law 'auto' tries slip and a camera error with a memory"
+    words = tried if noise_law == "auto" else other
+    return (f"residuals are coloured ({found:.0f}, white ones below {WHITE}): intervals are too narrow; {words}",)
 
 
 def _residuals(fit: Fit, runs: Runs, log: Log) -> Pose:
     """Innovations in the units of the pose, row by row of the log."""
-    values: Any = np.asarray(fit.innovations.normalised * jnp.exp(0.5 * fit.innovations.log_variance))
+    values: Any = fit.innovations.normalised * np.exp(0.5 * fit.innovations.log_variance)
     values = np.where(np.asarray(runs.seen)[:, None], values, np.nan)
     lengths = [len(run.t) for run in log.runs()]
     return Pose(*(np.concatenate([v[k, :n] for v, n in zip(values, lengths, strict=True)]) for k in range(3)))

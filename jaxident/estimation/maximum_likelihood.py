@@ -11,7 +11,7 @@ from jaxident.estimation.likelihood import Innovations, innovations
 from jaxident.estimation.parameters import Law, Robot, from_vector, to_vector
 from jaxident.estimation.runs import Runs, cut_windows, run_axes
 from jaxident.estimation.scoring import Point, Search, covariance_at, search_from
-from jaxident.estimation.starter import Start, first_estimate, start_states
+from jaxident.estimation.starter import Start, channels, first_estimate, start_states
 from jaxident.numerics import in_blocks
 from jaxident.robot.drive import Physical
 from jaxident.robot.noise import Noise
@@ -57,10 +57,10 @@ def begin(runs: Runs, d_max: Array, window: int = WINDOW) -> Beginning:
 
 def _begin(runs: Runs, d_max: Array, window: int) -> Beginning:
     windows = cut_windows(runs, min(window, runs.seen.shape[1]))
-    estimate = first_estimate(windows, d_max)
+    pair = channels(windows)
+    estimate = first_estimate(pair, windows, d_max)
     per_run = windows.seen.shape[0] // runs.seen.shape[0]
-    first = jax.tree.map(lambda leaf: leaf[::per_run] if jnp.ndim(leaf) else leaf, windows)
-    return Beginning(estimate, start_states(estimate, first))
+    return Beginning(estimate, start_states(estimate, pair, windows)[::per_run])
 
 
 def first_point(beginning: Beginning, step: Array, law: Law) -> Point:

@@ -181,16 +181,16 @@ def propose(search: Search, failed: Array, law: Law, low: Array, high: Array) ->
     point, local, damping = search.point, search.local, search.damping
     slope = local.gradient.shared
     held = ((point.shared <= low) & (slope > 0.0)) | ((point.shared >= high) & (slope < 0.0))
-    whole, whole_starts, promised = newton(local, damping, held)
-    others, others_starts, rest = newton(local, damping, held.at[DEAD_ZONES].set(True))
+    both = jnp.stack([held, held.at[DEAD_ZONES].set(True)])
+    steps, starts, (promised, rest) = jax.vmap(lambda held: newton(local, damping, held))(both)
     holding = failed & (rest > KINK_TOLERANCE)
-    step, starts = (jnp.where(holding, a, b) for a, b in ((others, whole), (others_starts, whole_starts)))
+    step, starts = (jnp.where(holding, part[1], part[0]) for part in (steps, starts))
     longest = jnp.where(is_logarithmic(law), LONGEST_LOG_STEP, jnp.inf)
     longest = longest.at[DEAD_ZONES].set(LONGEST_SHARE * high[DEAD_ZONES])
     part = jnp.minimum(1.0, jnp.min(longest / jnp.maximum(jnp.abs(step), 1e-300)))
     moved = Point(jnp.clip(point.shared + part * step, low, high), point.starts + part * starts)
     level = (promised >= 0.0) & (promised < TOLERANCE) & (damping.dead_zones <= FIRST_DAMPING)
-    tiny = jnp.abs(whole) * jnp.sqrt(jnp.diagonal(local.shared)) < KINK_STEP
+    tiny = jnp.abs(steps[0]) * jnp.sqrt(jnp.diagonal(local.shared)) < KINK_STEP
     kink = (rest >= 0.0) & (rest * (1.0 + damping.others) < KINK_TOLERANCE) & jnp.all(tiny[DEAD_ZONES])
     return moved, holding, level | kink
 

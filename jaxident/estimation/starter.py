@@ -50,9 +50,8 @@ class Start(NamedTuple):
     residual: Any
 
 
-def first_estimate(windows: Runs, d_max: Array) -> Start:
-    """The best of two grids over dead zones in [0, d_max] and rates; windows (windows, rows)."""
-    pair = channels(windows)
+def first_estimate(pair: tuple[Channel, Channel], windows: Runs, d_max: Array) -> Start:
+    """The best of LOOKS grids over dead zones in [0, d_max] and rates; windows (windows, rows) and their channels."""
     rows, step = windows.seen.shape[1], jnp.mean(windows.step)
     counts = jnp.stack([jnp.sum(c.weight) * c.measured.shape[1] for c in pair])
 
@@ -180,7 +179,7 @@ def _lay(rate: Array, step: Array, pull: Array, direction: Array) -> Array:
     return jax.lax.scan(body, (first, place), (None if even else shared, pull, direction))[1]
 
 
-def start_states(start: Start, windows: Runs) -> Array:
+def start_states(start: Start, pair: tuple[Channel, Channel], windows: Runs) -> Array:
     """The state (windows, 5) x, y, theta, v, w at the first row of every window, by the same least squares."""
     step = windows.step if jnp.ndim(windows.step) == 0 else windows.step.T[..., None]
     passed = [dead_zone(u.T, width) for u, width in zip(windows.command, start.dead_zone, strict=True)]
@@ -196,5 +195,5 @@ def start_states(start: Start, windows: Runs) -> Array:
         speed = safe_divide(jnp.sum(centred * rest, axis=(0, 1)), power, jnp.zeros(()))
         return channel.mean + mean_rest - speed * mean_coast, speed[None]
 
-    (position, v), (heading, w) = (of_channel(channel, row) for row, channel in enumerate(channels(windows)))
+    (position, v), (heading, w) = (of_channel(channel, row) for row, channel in enumerate(pair))
     return jnp.concatenate([position, heading, v, w]).T
