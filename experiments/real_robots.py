@@ -4,9 +4,9 @@
 
 Five iRobot Create robots (UTIAS MRCLAM dataset 6, Leung et al. 2011; motion capture): identified on the first half of
 each log, predicted 10 s ahead on the second. A Husky (norlab-ulaval DRIVE; lidar): identified on 400 of its windows,
-predicted 1 s ahead on the other 203. The paper's method; maximum likelihood under the noise law that it
-finds; and a robot that does what it is told: the last measured pose, moved on with the commanded speeds. One picture per
-robot, of maximum likelihood, and a table: errors as medians and root mean squares over the starts.
+predicted 1 s ahead on the other 203. The paper's method; maximum likelihood under the noise law that it finds; and a
+robot that does what it is told: the last measured pose, moved on with the commanded speeds. One picture per robot, of
+maximum likelihood, and a table: errors as medians and root mean squares over the starts.
 """
 
 import argparse
