@@ -18,7 +18,7 @@ from jaxident.robot.noise import Noise
 
 WINDOW = 200
 """Rows of the windows that the starter fits: long enough for a slow pole, too short for slip to pile up."""
-MOST_STEPS = 40
+MOST_STEPS = 100
 BLOCK = 4
 """Trials of a batch whose starters run at once: the paths of more leave the second-level cache."""
 WHITE = Law()

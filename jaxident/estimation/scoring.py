@@ -50,8 +50,8 @@ class Local(NamedTuple):
 class Damping(NamedTuple):
     """Of the dead zones' part of a step, and of all other unknowns', relative to the curvature.
 
-    Apart, because a step of a dead zone across a level of the commands, where the cost has a kink, fails however near
-    the optimum all others are: damped alike they would hardly move while it is shortened.
+    Alike along a curved valley, apart at a kink: a step of a dead zone across a level of the commands, where the cost
+    has one, fails however near the optimum all others are; damped alike they would hardly move while it is shortened.
     """
 
     dead_zones: Any
@@ -60,13 +60,14 @@ class Damping(NamedTuple):
 
 class Search(NamedTuple):
     """Where a search stands: its best point, the curvature there, the point to look at next and whether its dead zones
-    are held as they were, damping, steps taken, whether it has arrived."""
+    are held as they were, damping, whole steps that failed one after the other, steps taken, whether it has arrived."""
 
     point: Point
     local: Local
     proposed: Point
     holding: Any
     damping: Any
+    failures: Any
     steps: Any
     arrived: Any
 
@@ -169,9 +170,9 @@ def newton(local: Local, damping: Damping, held: Array) -> tuple[Array, Array, A
     return step, starts, promised
 
 
-def propose(search: Search, failed: Array, law: Law, low: Array, high: Array) -> tuple[Point, Array, Array]:
+def propose(search: Search, kinked: Array, law: Law, low: Array, high: Array) -> tuple[Point, Array, Array]:
     """The damped step from a search's point, shortened where it is long and cut at the bounds; whether it holds the
-    dead zones, as it does after a whole step that failed while the others alone promise something; and whether the
+    dead zones, as it does where they seem to be at a kink and the others alone promise something; and whether the
     point is a minimum.
 
     It is one where the whole step promises next to nothing, or at a kink: where a dead zone meets a level of the
@@ -183,7 +184,7 @@ def propose(search: Search, failed: Array, law: Law, low: Array, high: Array) ->
     held = ((point.shared <= low) & (slope > 0.0)) | ((point.shared >= high) & (slope < 0.0))
     both = jnp.stack([held, held.at[DEAD_ZONES].set(True)])
     steps, starts, (promised, rest) = jax.vmap(lambda held: newton(local, damping, held))(both)
-    holding = failed & (rest > KINK_TOLERANCE)
+    holding = kinked & (rest > KINK_TOLERANCE)
     step, starts = (jnp.where(holding, part[1], part[0]) for part in (steps, starts))
     longest = jnp.where(is_logarithmic(law), LONGEST_LOG_STEP, jnp.inf)
     longest = longest.at[DEAD_ZONES].set(LONGEST_SHARE * high[DEAD_ZONES])
@@ -195,13 +196,16 @@ def propose(search: Search, failed: Array, law: Law, low: Array, high: Array) ->
     return moved, holding, level | kink
 
 
-def adapt(damping: Damping, better: Array, holding: Array) -> Damping:
-    """Less damping of what moved and did well, more of what moved and did not; of all unknowns a whole step blames the
-    dead zones first."""
-    others = damping.others * jnp.where(better, EASE, jnp.where(holding, STIFFEN, 1.0))
-    dead_zones = damping.dead_zones * jnp.where(holding, 1.0, jnp.where(better, EASE, STIFFEN))
-    others = jnp.maximum(others, LEAST_DAMPING)
-    return Damping(jnp.maximum(dead_zones, others), others)
+def adapt(search: Search, better: Array) -> Search:
+    """Less damping of what moved and did well, more of what moved and did not. A whole step that fails stiffens all;
+    from the second in a row on the dead zones alone, for it is they that are at a kink."""
+    others, failures = search.damping.others, search.failures
+    failed = ~better & ~search.holding
+    stiffer = (~better & search.holding) | (failed & (failures == 0))
+    others = jnp.maximum(others * jnp.where(better, EASE, jnp.where(stiffer, STIFFEN, 1.0)), LEAST_DAMPING)
+    dead_zones = search.damping.dead_zones * jnp.where(search.holding, 1.0, jnp.where(better, EASE, STIFFEN))
+    failures = jnp.where(search.holding, failures, jnp.where(better, 0, failures + 1))
+    return search._replace(damping=Damping(jnp.maximum(dead_zones, others), others), failures=failures)
 
 
 def search_from(point: Point, runs: Runs, law: Law, d_max: Array, most: int) -> Search:
@@ -213,10 +217,10 @@ def search_from(point: Point, runs: Runs, law: Law, d_max: Array, most: int) -> 
         local = local_at(there, runs, law)
         better = (local.value <= search.local.value) | (search.steps == 0)
         point, local = jax.tree.map(lambda a, b: jnp.where(better, a, b), (there, local), (search.point, search.local))
-        damping = adapt(search.damping, better, search.holding)
-        search = search._replace(point=point, local=local, damping=damping, steps=search.steps + 1)
-        proposed, holding, arrived = propose(search, ~better & ~search.holding, law, low, high)
-        return search._replace(proposed=proposed, holding=holding, arrived=arrived)
+        after = adapt(search, better)._replace(point=point, local=local, steps=search.steps + 1)
+        kinked = (after.failures > 1) & ~search.holding
+        proposed, holding, arrived = propose(after, kinked, law, low, high)
+        return after._replace(proposed=proposed, holding=holding, arrived=arrived)
 
     def walking(search):
         return ~search.arrived & (search.steps < most) & (search.damping.others < LARGEST_DAMPING)
@@ -224,8 +228,8 @@ def search_from(point: Point, runs: Runs, law: Law, d_max: Array, most: int) -> 
     unknown, count = len(names(law)), len(point.starts)
     shapes = (unknown, unknown), (count, START_STATES, START_STATES), (count, unknown, START_STATES)
     nothing = Local(jnp.asarray(jnp.inf), jax.tree.map(jnp.zeros_like, point), *map(jnp.zeros, shapes))
-    damping, no = Damping(*jnp.full(2, FIRST_DAMPING)), jnp.asarray(False)
-    return jax.lax.while_loop(walking, body, Search(point, nothing, point, no, damping, jnp.asarray(0), no))
+    damping, no, none = Damping(*jnp.full(2, FIRST_DAMPING)), jnp.asarray(False), jnp.asarray(0)
+    return jax.lax.while_loop(walking, body, Search(point, nothing, point, no, damping, none, none, no))
 
 
 def covariance_at(point: Point, local: Local, law: Law) -> Array:
