@@ -77,10 +77,9 @@ def identify(
     recursive least squares (15)-(18) over the rest of an even log. Its settings: setup_time [s] from the start
     (default: 200 samples or three tenths, whichever is more); forgetting in (0, 1] (default 1); reading of (21):
     "one_step" (default), as the recursion reads it and best on real robots, or "free_run". methods
-    "instrumental-variables" (one even run without gaps) and "key-term-least-squares" (even runs):
-    yardsticks, the same equations from all samples at once. d_max bounds the dead zones [unit of the command] (default:
-    0.9 of the largest command). Needs double precision; InputError says what a log lacks, WorkError that the result is
-    not finite.
+    "instrumental-variables" (one even run without gaps) and "key-term-least-squares" (even runs): yardsticks, the same
+    equations from all samples at once. d_max bounds the dead zones [unit of the command] (default: 0.9 of the largest
+    command). Needs double precision; InputError says what a log lacks, WorkError that the result is not finite.
     """
     require_float64("identify")
     _check_method(method, coupling, {"setup time": setup_time, "forgetting": forgetting, "reading": reading})

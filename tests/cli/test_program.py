@@ -65,8 +65,8 @@ def test_identify_bootstraps_with_a_seed(folder):
     rows = zip(*(column[:120] for column in (log.t, log.u_r, log.u_l, log.x, log.y, log.theta)), strict=True)
     text = "t,u_r,u_l,x,y,theta\n" + "".join(",".join(map(repr, map(float, row))) + "\n" for row in rows)
     (folder / "short.csv").write_text(text)
-    found = jaxident("identify", folder / "short.csv", "--bootstrap", 40, "--seed", 3, "--json", folder / "b.json",
-                     "--report", folder / "b.html")  # fmt: skip
+    found = jaxident("identify", folder / "short.csv", "--noise-law", "white", "--bootstrap", 40, "--seed", 3,
+                     "--json", folder / "b.json", "--report", folder / "b.html")  # fmt: skip
     assert found.returncode == 0, found.stderr
     assert "of 40 refits to resampled blocks" in found.stdout
     result = json.loads((folder / "b.json").read_text())

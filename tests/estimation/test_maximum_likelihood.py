@@ -163,7 +163,7 @@ def test_coloured_residuals_are_suspected():
     ],
 )
 def test_what_users_trip_over_is_suspected_after_any_fit(changed, words):
-    suspicions = identify(changed(logged(4, Noise(5e-4, 5e-3)))).suspicions
+    suspicions = identify(changed(logged(4, Noise(5e-4, 5e-3))), noise_law="white").suspicions
     assert any(words in line for line in suspicions), suspicions
 
 
