@@ -35,7 +35,7 @@ BLOCK = 512
 TRIAL_BLOCK = 125
 """Whole trials at a time; the search for start values takes fewer of them at once by itself."""
 
-FITS, FIT_SAMPLES, FIT_BLOCK, FIT_REPEATS = 64, 1000, 32, 3
+FITS, FIT_SAMPLES, FIT_BLOCK, FIT_REPEATS = 64, 1000, 16, 3
 REPEATS, STEPS = 7, 1000
 
 
