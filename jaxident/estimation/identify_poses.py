@@ -16,7 +16,6 @@ from jaxident.estimation.precision import difference_covariance, spread_of
 from jaxident.estimation.runs import Runs, stack_runs
 from jaxident.estimation.suspicions import log_suspicions
 from jaxident.log import Log
-from jaxident.robot.drive import Physical
 from jaxident.robot.model import Model, Provenance
 
 SMALLEST_LOG = 20
@@ -47,7 +46,7 @@ def identify_poses(log: Log, d_max: float, noise_law: str, coupling: bool) -> Po
     fit, law = fit_law(jax.tree.map(jnp.asarray, runs), jnp.asarray(d_max), noise_law, coupling)
     if not all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves((fit.robot, fit.covariance))):
         raise WorkError("the maximum-likelihood estimate is not finite: the log does not determine the model")
-    deviation = np.sqrt(np.diagonal(np.asarray(fit.covariance))[2:6]).reshape(2, 2)
+    deviation = np.sqrt(np.diagonal(fit.covariance)[2:6]).reshape(2, 2)
     suspicions = (*_suspicions(fit, runs, noise_law), *log_suspicions(log, fit.robot, deviation))
     return PoseFit(_model(fit, law, float(np.median(_steps(log)))), _residuals(fit, runs, log), fit, law, suspicions)
 
@@ -68,12 +67,11 @@ def _steps(log: Log) -> np.ndarray:
 def _model(fit: Fit, law: Law, period: float) -> Model:
     """The estimate as a model with its noise law, covariance and standard deviations."""
     difference = _difference_covariance(fit, period, law)
-    drive, noise = fit.robot.drive, fit.robot.noise
-    coupling = None if drive.coupling is None else np.asarray(drive.coupling)
+    noise = fit.robot.noise
     return Model(
         period,
-        Physical(np.asarray(drive.rate), np.asarray(drive.gain), coupling),
-        np.asarray(fit.robot.dead_zone),
+        fit.robot.drive,
+        fit.robot.dead_zone,
         noise=noise._replace(**{name: float(v) for name, v in noise._asdict().items() if v is not None}),
         standard_deviation=spread_of(fit.covariance, difference, law),
         covariance=fit.covariance,
@@ -92,7 +90,7 @@ def _suspicions(fit: Fit, runs: Runs, noise_law: str) -> tuple[str, ...]:
     found = colour(fit, runs)
     if found < WHITE:
         return ()
-    tried = "no noise law makes them white, so the model lacks something: `jaxident diagnose` looks for it"
+    tried = "no noise law makes them white, so the model may lack something: `jaxident diagnose` looks for it"
     other = "the noise law 'auto' tries slip and a camera error with a memory"
     words = tried if noise_law == "auto" else other
     return (f"residuals are coloured ({found:.0f}, white ones below {WHITE}): intervals are too narrow; {words}",)

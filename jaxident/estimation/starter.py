@@ -3,7 +3,7 @@
 For given dead zones D and rate r, heading is linear in the gains of its row and in each window's heading and turn rate
 at its start; with the measured heading as direction, so are x and y in the gains of theirs. Windows with a start of
 their own keep slip and drift from piling up. Concentrated over the noise, each channel's cost is n/2 log(squares),
-the two are added, and the lowest pair of dead zones on a grid wins; a second, finer grid follows.
+the two are added, and finer grids follow around the lowest pairs of dead zones on a grid.
 """
 
 from typing import Any, NamedTuple
@@ -17,8 +17,10 @@ from jaxident.numerics import hold_integrals, safe_divide, sin_cos
 from jaxident.robot.dead_zone import dead_zone
 
 WIDTHS, RATES, LOOKS, FINER = 9, 7, 3, 3.0
-"""Dead zones and rates in a grid, how many grids, each FINER times as fine in dead zones as the one before; in rates
-the next grid spans the neighbours of the best."""
+"""Dead zones and rates in a grid, how many grids, each FINER times as fine as the one before."""
+FOLLOWED = 8
+"""Points of the first grid that finer ones follow, over the number of windows: of five windows the best alone will do,
+of a single one the right valley is not always the deepest at first (`experiments/efficiency.md`)."""
 SLOWEST, FASTEST = 0.25, 2.5
 """Rates searched first: from SLOWEST per window to FASTEST per step."""
 
@@ -51,23 +53,32 @@ class Start(NamedTuple):
 
 
 def first_estimate(pair: tuple[Channel, Channel], windows: Runs, d_max: Array) -> Start:
-    """The best of LOOKS grids over dead zones in [0, d_max] and rates; windows (windows, rows) and their channels."""
+    """The best of LOOKS grids over dead zones in [0, d_max] and rates; windows (windows, rows) and their channels.
+
+    The first grid's best points, as many as FOLLOWED says, each lead to finer ones around them.
+    """
     rows, step = windows.seen.shape[1], jnp.mean(windows.step)
     counts = jnp.stack([jnp.sum(c.weight) * c.measured.shape[1] for c in pair])
+    first = jnp.geomspace(SLOWEST / (rows * step), FASTEST / step, RATES)
+    spread = (first[1] / first[0]) ** jnp.linspace(-1.0, 1.0, RATES)
 
-    def look(grid, finer):
-        """The best of a grid (rates (2, RATES), widths (2, WIDTHS)), and the next grid around it."""
-        rates, widths = grid
-        best = _search(pair, windows, rates, widths, counts)
-        spread = (rates[0, 1] / rates[0, 0]) ** jnp.linspace(-1.0, 1.0, RATES)
-        sides = 0.5 * d_max * finer * jnp.linspace(-1.0, 1.0, WIDTHS)
-        return (best.rate[:, None] * spread, jnp.clip(best.dead_zone[:, None] + sides, 0.0, d_max)), best
+    def look(best, finer):
+        """The best of a grid around a point, in rates and dead zones so many times finer than the first."""
+        sides = 0.5 * d_max / finer * jnp.linspace(-1.0, 1.0, WIDTHS)
+        widths = jnp.clip(best.dead_zone[:, None] + sides, 0.0, d_max)
+        rates = best.rate[:, None] * spread ** (FINER / finer)
+        found, cost = _search(pair, windows, rates, widths, counts, 1)
+        return jax.tree.map(lambda leaf: leaf[0], (found, cost))
 
-    rates = jnp.geomspace(SLOWEST / (rows * step), FASTEST / step, RATES)
+    def follow(point):
+        """From a point (Start, cost) of the first grid to the last grid's best."""
+        return jax.lax.scan(lambda now, finer: (look(now[0], finer), None), point, FINER ** jnp.arange(1.0, LOOKS))[0]
+
     widths = jnp.linspace(0.0, d_max, WIDTHS)
-    first = jnp.tile(rates, (2, 1)), jnp.tile(widths, (2, 1))
-    _, found = jax.lax.scan(look, first, FINER ** -jnp.arange(1.0, LOOKS + 1))
-    best = jax.tree.map(lambda leaf: leaf[-1], found)
+    many = max(1, FOLLOWED // len(windows.seen))
+    points = _search(pair, windows, jnp.tile(first, (2, 1)), jnp.tile(widths, (2, 1)), counts, many)
+    found, cost = jax.lax.map(follow, points)
+    best = jax.tree.map(lambda leaf: leaf[jnp.argmin(cost)], found)
     return best._replace(residual=jnp.sqrt(best.residual / jnp.maximum(counts, 1.0)))
 
 
@@ -108,22 +119,34 @@ def _bridge(theta: Array, seen: Array) -> Array:
     return whole[before] + part * (whole[after] - whole[before])
 
 
-def _search(pair: tuple, windows: Runs, rates: Array, widths: Array, counts: Array) -> Start:
-    """The best point of a grid, its squares (2,) in `residual`; counts (2,): how many numbers each channel has."""
+def _search(pair: tuple, windows: Runs, rates: Array, widths: Array, counts: Array, many: int) -> tuple[Start, Array]:
+    """The best points (many, ...) of a grid, their squares (2,) in `residual`, and their costs (many,).
+
+    rates (2, RATES), widths (2, WIDTHS), counts (2,): how many numbers each channel has.
+    """
     fits = [_fit(channel, windows, rate, widths) for channel, rate in zip(pair, rates, strict=True)]
-    costs = [n * jnp.log(jnp.min(fit.squares, axis=0)) for n, fit in zip(counts, fits, strict=True)]
-    right, left = jnp.unravel_index(jnp.argmin(costs[0] + costs[1]), costs[0].shape)
-    best = [jnp.argmin(fit.squares[:, right, left]) for fit in fits]
-    return Start(
-        rate=jnp.stack([rate[k] for rate, k in zip(rates, best, strict=True)]),
-        gain=jnp.stack([fit.gain[k, right, left] for fit, k in zip(fits, best, strict=True)]),
-        dead_zone=jnp.stack([widths[0][right], widths[1][left]]),
-        residual=jnp.stack([fit.squares[k, right, left] for fit, k in zip(fits, best, strict=True)]),
-    )
+    cost = sum(n * jnp.log(jnp.min(fit.squares, axis=0)) for n, fit in zip(counts, fits, strict=True))
+
+    def at(place):
+        right, left = jnp.unravel_index(place, cost.shape)
+        best = [jnp.argmin(fit.squares[:, right, left]) for fit in fits]
+        return Start(
+            rate=jnp.stack([rate[k] for rate, k in zip(rates, best, strict=True)]),
+            gain=jnp.stack([fit.gain[k, right, left] for fit, k in zip(fits, best, strict=True)]),
+            dead_zone=jnp.stack([widths[0][right], widths[1][left]]),
+            residual=jnp.stack([fit.squares[k, right, left] for fit, k in zip(fits, best, strict=True)]),
+        )
+
+    falling, places = jax.lax.top_k(-cost.ravel(), many)
+    return jax.vmap(at)(places), -falling
 
 
+@jax.jit
 def _fit(channel: Channel, windows: Runs, rates: Array, grid: Array) -> Fits:
-    """Least squares in both gains and every window's start, for all rates and pairs of dead zones (2, widths)."""
+    """Least squares in both gains and every window's start, for all rates and pairs of dead zones (2, widths).
+
+    Under `jit` to be traced once for the first grid and the finer ones.
+    """
     passed = [dead_zone(u.T[..., None], widths) for u, widths in zip(windows.command, grid, strict=True)]
     pull = jnp.concatenate(passed, axis=-1)
     step = windows.step if jnp.ndim(windows.step) == 0 else windows.step.T[..., None]

@@ -48,8 +48,9 @@ def logged(seed, noise=None, rows=300, jitter=0.0):
     return Log(*(np.asarray(column) for column in made))
 
 
-def trials(name, noise, law, count, rows=1000):
-    """Errors over the bound (trials, unknowns), errors over the fit's own deviation, and whether each fit is ok."""
+def trials(name, noise, law, count, rows=1000, which=slice(None)):
+    """Errors over the bound (trials, unknowns), errors over the fit's own deviation, whether each fit is ok, and its
+    steps, of `count` trials or of some of these."""
 
     @jax.jit
     @jax.vmap
@@ -59,9 +60,9 @@ def trials(name, noise, law, count, rows=1000):
         vector = to_vector(Robot(DRIVE, DEAD_ZONE, noise), law)
         bound = jnp.sqrt(jnp.diagonal(bound_covariance(vector, jnp.zeros(5), runs, law)))
         error = natural_values(fit.robot, law) - natural_values(from_vector(vector, law), law)
-        return error / bound, error / jnp.sqrt(jnp.diagonal(fit.covariance)), fit.ok
+        return error / bound, error / jnp.sqrt(jnp.diagonal(fit.covariance)), fit.ok, fit.steps
 
-    return tuple(map(np.asarray, one(jax.random.split(jax.random.key(7), count))))
+    return tuple(map(np.asarray, one(jax.random.split(jax.random.key(7), count)[which])))
 
 
 def test_exact_data_are_recovered():
@@ -76,7 +77,7 @@ def test_exact_data_are_recovered():
 def test_errors_stay_near_the_bound_and_intervals_cover():
     """RMS over the bound of 8 parameters in 48 trials: each is within 1 +- 3 / sqrt(2 * 48), their mean (correlated) in
     a narrower band; 384 intervals cover 95 % within 3 standard errors of some 2 %."""
-    over_bound, over_own, ok = trials("multilevel", Noise(1e-3, 1e-2), Law(), 48)
+    over_bound, over_own, ok, _ = trials("multilevel", Noise(1e-3, 1e-2), Law(), 48)
     assert ok.all()
     rms = np.sqrt(np.mean(over_bound[:, :8] ** 2, axis=0))
     assert rms.max() < 1.31
@@ -85,10 +86,19 @@ def test_errors_stay_near_the_bound_and_intervals_cover():
 
 
 def test_a_dead_zone_on_a_level_of_the_input_is_arrived_at():
-    """The left wheel's dead zone lies on a level of the staircase, where the cost has a kink."""
-    _, over_own, ok = trials("staircase", Noise(1e-3, 1e-2), Law(), 48)
+    """The left wheel's dead zone lies on a level of the staircase, where the cost has a kink: damped like all others it
+    takes 44 to 58 steps in one trial of seventeen."""
+    _, over_own, ok, steps = trials("staircase", Noise(1e-3, 1e-2), Law(), 48)
     assert ok.all()
+    assert steps.max() <= 40
     assert np.mean(np.abs(over_own[:, 7]) < 1.96) > 0.8
+
+
+def test_a_short_run_ends_in_the_right_valley():
+    """Four of 400 runs of 200 rows in which the first grid's best point leads into another one."""
+    over_bound, _, ok, _ = trials("multilevel", Noise(2e-4, 2e-3), Law(), 400, 200, jnp.array([40, 227, 311, 398]))
+    assert ok.all()
+    assert np.abs(over_bound[:, :8]).max() < 5.0
 
 
 @pytest.mark.slow
@@ -96,7 +106,7 @@ def test_a_dead_zone_on_a_level_of_the_input_is_arrived_at():
 @pytest.mark.parametrize("millimetres", [0.2, 0.5, 1.0, 2.0, 5.0])
 def test_every_cell_reaches_the_bound(name, millimetres):
     """500 seeds: each RMS has a standard error of 3 %."""
-    over_bound, _, ok = trials(name, Noise(1e-3 * millimetres, 1e-2 * millimetres), Law(), 500)
+    over_bound, _, ok, _ = trials(name, Noise(1e-3 * millimetres, 1e-2 * millimetres), Law(), 500)
     assert ok.mean() >= 0.995
     rms = np.sqrt(np.mean(over_bound[ok, :8] ** 2, axis=0))
     assert rms.max() < 1.15
@@ -110,7 +120,7 @@ def test_every_cell_reaches_the_bound(name, millimetres):
 def test_intervals_cover_under_the_law_that_made_the_data(noise):
     """64 trials of 8 parameters, of which some are correlated: 95 % within 3 points."""
     law = Law(memory=noise.correlation_time is not None, slip=noise.slip_along > 0.0)
-    _, over_own, ok = trials("multilevel", noise, law, 64, 500)
+    _, over_own, ok, _ = trials("multilevel", noise, law, 64, 500)
     assert ok.mean() > 0.98
     assert 0.92 < np.mean(np.abs(over_own[ok, :8]) < 1.96) < 0.98
 
