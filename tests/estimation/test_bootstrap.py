@@ -39,7 +39,7 @@ def logged(seed, noise, rows=240):
 def widths(seed, noise):
     """Standard deviations of the eight parameters over those of the likelihood, which takes the camera for white."""
     log = logged(seed, noise)
-    found = identify(log)
+    found = identify(log, noise_law="white")
     again = bootstrap(jax.random.key(seed), found, log, count=80)
     assert again.ok.mean() > 0.95
     return np.sqrt(np.diagonal(again.covariance) / np.diagonal(np.asarray(found.covariance)))[:8], again, found
