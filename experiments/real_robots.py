@@ -57,6 +57,7 @@ def judge(name: str, known: Log, unseen: Log, horizon: int, burn_in: int, baseli
         seconds, noise = time.monotonic() - begin, found.model.noise._asdict() if found.model.noise else {}
         error = prediction_error(prediction, unseen)
         rows.append({"robot": name, "method": method, "ok": bool(found.ok), "took": seconds, **error, **noise})
+    # The picture is that of the last method: maximum likelihood.
     draw(name, unseen, prediction, f"{error['position_median']:.2g} m off after {error['seconds']:.2g} s (median)", out)
     rows.append({"robot": name, "method": "commanded", **prediction_error(baseline(unseen, prediction), unseen)})
     for row in rows:
@@ -99,6 +100,23 @@ def husky(data: pathlib.Path, out: pathlib.Path) -> list[dict]:
     return judge("husky", known, unseen, 20, 19, lambda u, p: commanded(u, p, HUSKY_TRACK, HUSKY_WHEEL), out)
 
 
+def table(rows: list[dict]) -> str:
+    """The rows as a Markdown table."""
+    names = ("position_median", "position_rms", "heading_median", "heading_rms")
+    lines = [
+        "| robot | method | starts | position, median [m] | rms [m] | heading, median [rad] | rms [rad] | noise law |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for row in rows:
+        slips, memory = row.get("slip_along"), row.get("correlation_time")
+        law = " and ".join(
+            words for words, there in (("slip", slips), (f"memory {memory or 0:.2g} s", memory)) if there
+        )
+        cells = [row["robot"], row["method"], str(row["compared"]), *(f"{row[name]:.3f}" for name in names), law]
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
 def main() -> None:
     """Run all and write the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -109,6 +127,7 @@ def main() -> None:
     options.out.mkdir(parents=True, exist_ok=True)
     rows = [*creates(options.data, options.robots, options.out), *husky(options.data, options.out)]
     (options.out / "table.json").write_text(json.dumps(rows, indent=2) + "\n")
+    (options.out / "table.md").write_text(table(rows))
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ import jaxident as ji
 from jaxident.files.streams import merge, read_commands, read_poses
 from jaxident.log import Log, join
 
+CREATES = [f"create_{k}" for k in range(1, 6)]
 CREATE_TRACK, PERIOD, PARTS = 0.258, 0.05, 12
 
 SIZES = {

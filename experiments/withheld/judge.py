@@ -11,6 +11,7 @@ import jaxident as ji
 from . import picture
 from .fresh import fresh_runs, true_shrink
 from .marks import mark
+from .misses import misses
 from .score import table
 
 RANDOM = ("coloured_noise", "outliers", "frozen_frames", "lost_commands")
@@ -18,8 +19,8 @@ RANDOM = ("coloured_noise", "outliers", "frozen_frames", "lost_commands")
 
 
 def judge(answers: dict[str, dict], folders: dict[str, pathlib.Path], out: pathlib.Path, shrink: bool = True) -> dict:
-    """Tables by generator and method; folders: that of each method's diagnoses. Writes OUT/scores.json, table.md and
-    pictures."""
+    """Tables by generator and method; folders: that of each method's diagnoses, ours first. Writes OUT/scores.json,
+    table.md, misses.md of the first method, and pictures."""
     out.mkdir(parents=True, exist_ok=True)
     marks = {
         method: {name: one(answer, folder / name, shrink) for name, answer in answers.items()}
@@ -35,6 +36,7 @@ def judge(answers: dict[str, dict], folders: dict[str, pathlib.Path], out: pathl
             draw(own, {name: found[name] for name in own}, out, f"{kind}_{method}")
     (out / "scores.json").write_text(json.dumps({"tables": tables, "marks": marks}, indent=1) + "\n")
     (out / "table.md").write_text("\n".join(pages))
+    (out / "misses.md").write_text(misses(answers, next(iter(marks.values()))))
     print("\n".join(pages))
     return tables
 

@@ -11,7 +11,7 @@ import pathlib
 
 import numpy as np
 
-from .inject import CREATE_TRACK, PERIOD, read_robot
+from .inject import CREATE_TRACK, CREATES, PERIOD, read_robot
 
 SETTLED, LONG = 20, 10
 """Rows before a stretch in which the command stays, and rows of it."""
@@ -44,7 +44,7 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=pathlib.Path, required=True)
-    parser.add_argument("--robots", nargs="+", default=["create_1"], help="create_1 to create_5")
+    parser.add_argument("--robots", nargs="+", default=CREATES, help="create_1 to create_5")
     options = parser.parse_args()
     print("| robot | commanded turn [rad/s] | stretches | speed over commanded (quartiles) | turn over commanded |")
     print("|---|---|---|---|---|")

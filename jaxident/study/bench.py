@@ -44,8 +44,7 @@ class Bench(NamedTuple):
     second (1000 samples each, noise drawn, start values searched), milliseconds per search for start values, each the
     median of REPEATS; microseconds that one robot waits for `recursive.step` on one row of plain numbers, the call
     included; milliseconds per maximum-likelihood fit in a batch of 64 runs of 1000 samples of a robot without coupling,
-    the median of FIT_REPEATS;
-    seconds that the whole trial took to compile; devices and versions."""
+    the median of FIT_REPEATS; seconds that the whole trial took to compile; devices and versions."""
 
     simulate_ns: float
     path_length_ns: float

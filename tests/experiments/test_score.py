@@ -110,6 +110,16 @@ def test_diagnoses_are_run_and_judged(tmp_path):
     assert rows["failed"] == 0.5
     assert (tmp_path / "scores" / "confusion_batch_slope.png").exists()
     assert "one effect: named" in (tmp_path / "scores" / "table.md").read_text()
+    assert "slope (0.13)" in (tmp_path / "scores" / "misses.md").read_text()
+
+
+def test_every_miss_is_a_row():
+    answer = {"effects": [{"name": "slope"}], "strength": [0.5], "slip": 0.01, "inputs": "multilevel"}
+    right = {"kind": "single", "right": True, "site": True, "channel": None, "claimed": True, "selected": ["slope"]}
+    marks = {"case_1": right, "case_2": right | {"site": False, "interval": [0.2, 0.4], "shrink": 0.5}}
+    rows = misses(dict.fromkeys(marks, answer), marks).splitlines()
+    said = "site, shrink 0.200 to 0.400 said, 0.500 true"
+    assert rows[2:] == [f"| 2 | single | slope (0.50) | yes | multilevel | slope | {said} |"]
 
 
 def test_a_case_written_is_a_log_of_the_package(tmp_path):

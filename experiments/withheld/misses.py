@@ -1,0 +1,44 @@
+"""Every miss of a diagnosis as a row: what was hidden, what was said, which marks are wrong."""
+
+from typing import Any
+
+HEADER = "| case | kind | hidden (strength) | slip | input | said | wrong |\n|---|---|---|---|---|---|---|"
+
+
+def misses(answers: dict[str, dict], marks: dict[str, dict]) -> str:
+    """A Markdown table of the cases with a wrong mark."""
+    rows = [HEADER]
+    for name in sorted(marks):
+        answer, own = answers[name], marks[name]
+        found = wrong(own)
+        if found:
+            effects = zip(answer["effects"], answer["strength"], strict=True)
+            hidden = ", ".join(f"{effect['name']} ({strength:.2f})" for effect, strength in effects)
+            cells = (
+                name.removeprefix("case_"),
+                own["kind"],
+                hidden,
+                "yes" if answer.get("slip") else "",
+                answer["inputs"],
+                ", ".join(own["selected"]) or own["verdict"],
+                ", ".join(found),
+            )
+            rows.append(f"| {' | '.join(cells)} |")
+    return "\n".join(rows) + "\n"
+
+
+def wrong(marks: dict[str, Any]) -> list[str]:
+    """In words, what is wrong with a diagnosis by its marks (`marks.mark`, with `interval` and `shrink`)."""
+    found = {
+        "name": marks["right"] is False,
+        "site": marks["site"] is False,
+        "channel": marks["channel"] is False,
+        "claimed": marks["kind"] == "none" and marks["claimed"],
+        "not unknown": marks["kind"] == "outside" and not marks["unknown"],
+    }
+    words = [word for word, missed in found.items() if missed]
+    low, high = marks.get("interval") or (None, None)
+    shrink = marks.get("shrink")
+    if low is not None and shrink is not None and not low <= shrink <= high:
+        words.append(f"shrink {low:.3f} to {high:.3f} said, {shrink:.3f} true")
+    return words
