@@ -11,6 +11,7 @@ from withheld.diagnose import diagnose
 from withheld.fresh import fresh_runs, local_motion, true_shrink
 from withheld.intervals import bootstrap, wilson
 from withheld.judge import judge
+from withheld.misses import misses
 from withheld.score import calibration_error, table
 
 import jaxident as ji
