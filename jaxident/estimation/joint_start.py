@@ -22,7 +22,8 @@ WIDE = (1.0, 1.0, 1.0, 10.0, 10.0)
 
 
 def begin_from_run(run: Runs, d_max: Array, law: Law) -> tuple[Belief, Noise, Array, Array]:
-    """Belief, noise law, and widest variances (PARAMETERS,) after a setup run (rows,), and whether the fit arrived.
+    """Belief, noise law, and widest variances (PARAMETERS,) after a setup run (rows,), and whether the fit arrived and
+    told every parameter better than its widest variance does: from a ridge the filter does not find back.
 
     Given the parameters, the state at the end is that of the filter over the run; its slopes by the parameters carry
     their covariance over. Nothing is linearised about a poor estimate, which is what biases a joint filter that
@@ -32,10 +33,12 @@ def begin_from_run(run: Runs, d_max: Array, law: Law) -> tuple[Belief, Noise, Ar
     fit = fit_runs(runs, d_max, law)
     vector, noise = to_vector(fit.robot, law)[:PARAMETERS], fit.robot.noise
     widest = widest_variance(vector, d_max)
-    covariance = narrowed(fit.covariance[:PARAMETERS, :PARAMETERS], vector, widest)
+    wide = fit.covariance[:PARAMETERS, :PARAMETERS]
+    told = jnp.all(jnp.diagonal(wide) < widest * natural_scale(vector) ** 2)
+    covariance = narrowed(wide, vector, widest)
 
     belief = at_the_end(vector, covariance, run, Motion(*fit.starts[0]), noise, None)
-    return belief, noise, widest, fit.ok
+    return belief, noise, widest, fit.ok & told
 
 
 def at_the_end(vector: Array, covariance: Array, run: Runs, start: Motion, noise: Noise, coupling) -> Belief:
@@ -93,9 +96,14 @@ def widest_variance(vector: Array, d_max: Array) -> Array:
 def narrowed(covariance: Array, vector: Array, widest: Array) -> Array:
     """A covariance (PARAMETERS, PARAMETERS) in natural units as that of a vector, no wider than the widest: a
     parameter that the setup did not show gets a variance that the filter can compute with."""
-    natural = jnp.concatenate([jnp.exp(vector[:2]), jnp.ones(PARAMETERS - 2)])
+    natural = natural_scale(vector)
     scale = natural * jnp.sqrt(jnp.maximum(widest, 1e-300))
     values, vectors = jnp.linalg.eigh(covariance / scale / scale[:, None])
     values = jnp.maximum(values, 0.0)
     back = scale / natural
     return (vectors * (values / (1.0 + values))) @ vectors.T * back * back[:, None]
+
+
+def natural_scale(vector: Array) -> Array:
+    """Natural units (PARAMETERS,) per unit of a vector, whose rates are logarithms."""
+    return jnp.concatenate([jnp.exp(vector[:2]), jnp.ones(PARAMETERS - 2)])

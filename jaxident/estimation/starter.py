@@ -6,6 +6,7 @@ their own keep slip and drift from piling up. Concentrated over the noise, each 
 the two are added, and finer grids follow around the lowest pairs of dead zones on a grid.
 """
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -18,9 +19,11 @@ from jaxident.robot.dead_zone import dead_zone
 
 WIDTHS, RATES, LOOKS, FINER = 9, 7, 3, 3.0
 """Dead zones and rates in a grid, how many grids, each FINER times as fine as the one before."""
-FOLLOWED = 8
-"""Points of the first grid that finer ones follow, over the number of windows: of five windows the best alone will do,
-of a single one the right valley is not always the deepest at first (`experiments/efficiency.md`)."""
+FOLLOWED = 20
+"""Points of the first grid that finer ones follow, over the square of the number of windows: of several windows the
+best alone will do, of one the right valley is not always the deepest at first (`experiments/efficiency.md`)."""
+MORE = 2
+"""Grids more where several points are followed: a short run has kinks beside its optimum, at levels of its commands."""
 SLOWEST, FASTEST = 0.25, 2.5
 """Rates searched first: from SLOWEST per window to FASTEST per step."""
 
@@ -70,15 +73,17 @@ def first_estimate(pair: tuple[Channel, Channel], windows: Runs, d_max: Array) -
         found, cost = _search(pair, windows, rates, widths, counts, 1)
         return jax.tree.map(lambda leaf: leaf[0], (found, cost))
 
-    def follow(point):
-        """From a point (Start, cost) of the first grid to the last grid's best."""
-        return jax.lax.scan(lambda now, finer: (look(now[0], finer), None), point, FINER ** jnp.arange(1.0, LOOKS))[0]
+    def follow(point, finer):
+        """From a point (Start, cost) through grids so many times finer to the last one's best."""
+        return jax.lax.scan(lambda now, finer: (look(now[0], finer), None), point, finer)[0]
 
     widths = jnp.linspace(0.0, d_max, WIDTHS)
-    many = max(1, FOLLOWED // len(windows.seen))
+    many = max(1, FOLLOWED // len(windows.seen) ** 2)
     points = _search(pair, windows, jnp.tile(first, (2, 1)), jnp.tile(widths, (2, 1)), counts, many)
-    found, cost = jax.lax.map(follow, points)
+    found, cost = jax.lax.map(partial(follow, finer=FINER ** jnp.arange(1.0, LOOKS)), points)
     best = jax.tree.map(lambda leaf: leaf[jnp.argmin(cost)], found)
+    if many > 1:
+        best, _ = follow((best, jnp.min(cost)), FINER ** jnp.arange(LOOKS, LOOKS + MORE))
     return best._replace(residual=jnp.sqrt(best.residual / jnp.maximum(counts, 1.0)))
 
 
