@@ -87,10 +87,9 @@ def _cells(rows) -> list[str]:
     good = [row for row in rows if row[4]]
     error = 100.0 * np.stack([row[2] / TRUTH - 1.0 for row in good])
     half = 100.0 * np.stack([row[3] for row in good]) / np.abs(TRUTH)
-    inside = (np.abs(error) <= half)[np.isfinite(half)]
-    covered = (
-        f"{100 * inside.mean():.0f} ± {100 * inside.std() / inside.size**0.5:.0f} %" if inside.size else "none told"
-    )
+    inside = np.mean(np.abs(error) <= half, axis=1)[np.isfinite(half).all(axis=1)]  # of one record they err together
+    spread = 100 * inside.std() / max(1, len(inside)) ** 0.5
+    covered = f"{100 * inside.mean():.1f} ± {spread:.1f} %" if len(inside) else "none told"
     worst = np.sqrt(np.mean(error**2, axis=1)).max()
     return [_size(error[:, :6]), _size(error[:, 6:]), f"{worst:.3g} %", covered, str(len(rows) - len(good)),
             f"{np.median([row[5] for row in good]):.2g}"]  # fmt: skip
