@@ -18,6 +18,10 @@ from jaxident.robot.noise import Noise
 
 WINDOW = 200
 """Rows of the windows that the starter fits: long enough for a slow pole, too short for slip to pile up."""
+PART = 8
+"""Windows in a part, parts in a larger one, and so on: a run of two parts or more is searched in parts first, each with
+a start of its own. The starter's dead zones lie on a grid, and over thousands of rows what they are off by sums up to
+whole turns; where wheels slip a prediction does not reach as far."""
 MOST_STEPS = 100
 BLOCK = 4
 """Trials of a batch whose starters run at once: the paths of more leave the second-level cache."""
@@ -43,24 +47,25 @@ class Fit(NamedTuple):
 
 
 class Beginning(NamedTuple):
-    """Where searches begin, whatever the law: the starter's estimate, and states (runs, 5) at each run's first row."""
+    """Where searches begin, whatever the law: the starter's estimate, and states (runs, windows, 5) at the first row of
+    each of its windows."""
 
     estimate: Start
     starts: Any
 
 
-@partial(jax.jit, static_argnames=("window",))
-def begin(runs: Runs, d_max: Array, window: int = WINDOW) -> Beginning:
-    """The starter's estimate on windows of some rows of the runs (runs, rows)."""
-    return in_blocks(partial(_begin, window=window), BLOCK)(runs, jnp.asarray(d_max))
+@jax.jit
+def begin(runs: Runs, d_max: Array) -> Beginning:
+    """The starter's estimate on windows of the runs (runs, rows)."""
+    return in_blocks(_begin, BLOCK)(runs, jnp.asarray(d_max))
 
 
-def _begin(runs: Runs, d_max: Array, window: int) -> Beginning:
-    windows = cut_windows(runs, min(window, runs.seen.shape[1]))
+def _begin(runs: Runs, d_max: Array) -> Beginning:
+    windows = cut_windows(runs, min(WINDOW, runs.seen.shape[1]))
     pair = channels(windows)
     estimate = first_estimate(pair, windows, d_max)
-    per_run = windows.seen.shape[0] // runs.seen.shape[0]
-    return Beginning(estimate, start_states(estimate, pair, windows)[::per_run])
+    starts = start_states(estimate, pair, windows)
+    return Beginning(estimate, starts.reshape(len(runs.seen), -1, starts.shape[-1]))
 
 
 def first_point(beginning: Beginning, step: Array, law: Law) -> Point:
@@ -71,21 +76,21 @@ def first_point(beginning: Beginning, step: Array, law: Law) -> Point:
     slip = 0.1 / jnp.mean(step) ** 1.5
     noise = Noise(position, heading, 2.0 * jnp.mean(step), slip * position, slip * heading)
     drive = Physical(estimate.rate, estimate.gain, jnp.zeros(2) if law.coupling else None)
-    return Point(to_vector(Robot(drive, estimate.dead_zone, noise), law), starts)
+    return Point(to_vector(Robot(drive, estimate.dead_zone, noise), law), starts[:, 0])
 
 
-def fit_runs(runs: Runs, d_max: Array, law: Law = WHITE, window: int = WINDOW) -> Fit:
+def fit_runs(runs: Runs, d_max: Array, law: Law = WHITE) -> Fit:
     """The estimate from runs (runs, rows) under a law, from the data alone; pure, maps over trials.
 
     d_max: largest dead zone [unit of the command]. A fit that fails comes back finite where it stopped, ok False.
     """
-    return fit_from(begin(runs, d_max, window), runs, d_max, law)
+    return fit_from(begin(runs, d_max), runs, d_max, law)
 
 
 @partial(jax.jit, static_argnames=("law",))
 def fit_from(beginning: Beginning, runs: Runs, d_max: Array, law: Law) -> Fit:
     """The estimate by a search from a given beginning."""
-    search = search_from(first_point(beginning, runs.step, law), runs, law, d_max, MOST_STEPS)
+    search = search_from(_nearer(beginning, runs, d_max, law), runs, law, d_max, MOST_STEPS)
     covariance = covariance_at(search.point, search.local, law)
     found = jax.vmap(lambda start, run: innovations(search.point.shared, start, run, law), in_axes=(0, run_axes(runs)))(
         search.point.starts, runs
@@ -99,6 +104,17 @@ def fit_from(beginning: Beginning, runs: Runs, d_max: Array, law: Law) -> Fit:
         ok=search.arrived & _regular(search, covariance, runs),
         steps=search.steps,
     )
+
+
+def _nearer(beginning: Beginning, runs: Runs, d_max: Array, law: Law) -> Point:
+    """The point where the search of whole runs begins: with long ones, where that of their parts ended."""
+    point, starts, rows = first_point(beginning, runs.step, law), beginning.starts, WINDOW
+    while not law.slip and runs.seen.shape[1] >= 2 * PART * rows:
+        starts, rows = starts[:, ::PART], PART * rows
+        point = point._replace(starts=starts.reshape(-1, starts.shape[-1]))
+        point = search_from(point, cut_windows(runs, rows), law, d_max, MOST_STEPS).point
+        starts = point.starts.reshape(starts.shape)
+    return point._replace(starts=starts[:, 0])
 
 
 def _regular(search: Search, covariance: Array, runs: Runs) -> Array:

@@ -118,11 +118,12 @@ def test_every_cell_reaches_the_bound(name, millimetres):
     "noise", [Noise(1e-3, 1e-2, -PERIOD / np.log(0.9)), Noise(1e-3, 1e-2, None, 0.01, 0.1)], ids=["ar1", "slip"]
 )
 def test_intervals_cover_under_the_law_that_made_the_data(noise):
-    """64 trials of 8 parameters, of which some are correlated: 95 % within 3 points."""
+    """64 trials of 8 parameters, of which some are correlated: a standard error of 1.3 points; 500 trials tell 93.5 and
+    94.5 % (`experiments/efficiency.md`)."""
     law = Law(memory=noise.correlation_time is not None, slip=noise.slip_along > 0.0)
-    _, over_own, ok, _ = trials("multilevel", noise, law, 64, 500)
+    _, over_own, ok, _ = trials("multilevel", noise, law, 64)
     assert ok.mean() > 0.98
-    assert 0.92 < np.mean(np.abs(over_own[ok, :8]) < 1.96) < 0.98
+    assert 0.9 < np.mean(np.abs(over_own[ok, :8]) < 1.96) < 0.98
 
 
 @pytest.mark.slow
@@ -152,6 +153,17 @@ def test_batch_is_the_loop_and_compiles_once():
             rtol=1e-6,
         )  # fmt: skip
     assert compiled._cache_size() == 1
+
+
+def test_a_long_run_is_found_in_few_steps():
+    """Its parts come first: from the starter itself, whose dead zones lie on a grid, the whole takes 7 steps."""
+    fit = jax.jit(lambda runs: fit_runs(runs, D_MAX))(
+        simulated(jax.random.key(2), "multilevel", Noise(1e-3, 1e-2), 8000)
+    )
+    assert fit.ok
+    assert fit.steps <= 5
+    error = natural_values(fit.robot, Law())[:8] - natural_values(Robot(DRIVE, DEAD_ZONE, Noise(1e-3, 1e-2)), Law())[:8]
+    assert np.abs(error / jnp.sqrt(jnp.diagonal(fit.covariance))[:8]).max() < 4.0
 
 
 def test_coloured_residuals_are_suspected():
