@@ -47,7 +47,7 @@ def identify_poses(log: Log, d_max: float, noise_law: str, coupling: bool) -> Po
     if not all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves((fit.robot, fit.covariance))):
         raise WorkError("the maximum-likelihood estimate is not finite: the log does not determine the model")
     deviation = np.sqrt(np.diagonal(fit.covariance)[2:6]).reshape(2, 2)
-    suspicions = (*_suspicions(fit, runs, noise_law), *log_suspicions(log, fit.robot, deviation))
+    suspicions = (*_suspicions(fit, law, runs, noise_law), *log_suspicions(log, fit.robot, deviation))
     return PoseFit(_model(fit, law, float(np.median(_steps(log)))), _residuals(fit, runs, log), fit, law, suspicions)
 
 
@@ -85,15 +85,23 @@ def _difference_covariance(fit: Fit, period: Array, law: Law) -> Array:
     return difference_covariance(to_vector(fit.robot, law), fit.covariance, period, law)
 
 
-def _suspicions(fit: Fit, runs: Runs, noise_law: str) -> tuple[str, ...]:
-    """A line where the residuals are not white: the intervals are then too narrow."""
+def _suspicions(fit: Fit, law: Law, runs: Runs, noise_law: str) -> tuple[str, ...]:
+    """A line where slip was found, which what the model lacks may look like; and where residuals are not white: the
+    intervals are then too narrow."""
+    lines = []
+    if noise_law == "auto" and law.slip:
+        lines.append(
+            "wheels seem to slip at random: they do, or the model lacks something; `jaxident diagnose` tells which"
+        )
     found = colour(fit, runs)
-    if found < WHITE:
-        return ()
-    tried = "no noise law makes them white, so the model may lack something: `jaxident diagnose` looks for it"
-    other = "the noise law 'auto' tries slip and a camera error with a memory"
-    words = tried if noise_law == "auto" else other
-    return (f"residuals are coloured ({found:.0f}, white ones below {WHITE}): intervals are too narrow; {words}",)
+    if found > WHITE:
+        tried = "no noise law makes them white, so the model may lack something: `jaxident diagnose` looks for it"
+        other = "the noise law 'auto' tries slip and a camera error with a memory"
+        words = tried if noise_law == "auto" else other
+        lines.append(
+            f"residuals are coloured ({found:.0f}, white ones below {WHITE}): intervals are too narrow; {words}"
+        )
+    return tuple(lines)
 
 
 def _residuals(fit: Fit, runs: Runs, log: Log) -> Pose:

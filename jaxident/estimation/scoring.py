@@ -17,8 +17,7 @@ from jaxident.estimation.parameters import Law, bounds, is_logarithmic, names
 from jaxident.estimation.runs import Runs, run_axes
 
 START_STATES = 5
-FIRST_DAMPING, EASE, STIFFEN = 1e-3, 0.03, 10.0
-LEAST_DAMPING, LARGEST_DAMPING = 1e-12, 1e12
+FIRST_DAMPING, EASE, STIFFEN, LEAST_DAMPING, LARGEST_DAMPING = 1e-3, 0.03, 10.0, 1e-12, 1e12
 """The least lies far below the flattest direction of a long run: at 1e-6, 32,000 rows are walked in 21 steps, not 5."""
 FLAT = 1e-13
 TOLERANCE = 1e-7

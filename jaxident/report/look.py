@@ -18,7 +18,7 @@ figure { margin: 1.25rem 0 1.5rem; }
 figcaption { color: var(--soft); font-size: 0.9rem; margin: 0.4rem 0; }
 .wide { overflow-x: auto; }
 .white { background: #ffffff; border: 1px solid var(--line); border-radius: 4px; padding: 0.5rem; }
-img { display: block; margin: 0 auto; max-width: max(100%, 34rem); height: auto; }
+img { display: block; margin: 0 auto; max-width: 100%; height: auto; }
 table { border-collapse: collapse; font-size: 0.92rem; font-variant-numeric: tabular-nums; }
 th, td { text-align: left; padding: 0.3rem 1.2rem 0.3rem 0; border-bottom: 1px solid var(--line);
   vertical-align: baseline; }
@@ -30,6 +30,11 @@ pre { background: var(--box); border: 1px solid var(--line); border-radius: 4px;
   overflow-x: auto; font: 0.85rem/1.45 ui-monospace, "Liberation Mono", "DejaVu Sans Mono", monospace; }
 footer { color: var(--soft); font-size: 0.85rem; margin-top: 3rem; padding-top: 0.75rem;
   border-top: 1px solid var(--line); overflow-wrap: break-word; }
+@media screen and (max-width: 34rem) {
+  table { font-size: 0.84rem; }
+  th, td { padding-right: 0.55rem; }
+  td { min-width: 0; }
+}
 @media print {
   :root { --text: #000000; --soft: #404040; --back: #ffffff; --line: #b0b0b0; --box: #ffffff; --mark: #000000; }
   @page { margin: 18mm 16mm; }

@@ -195,6 +195,9 @@ def test_auto_finds_the_noise_law():
     assert memory.model.noise.correlation_time == pytest.approx(0.3, rel=0.5)
     assert memory.model.noise.slip_along == 0.0
     assert memory.suspicions == ()
+    slipping = identify(logged(4, Noise(1e-3, 1e-2, None, 0.02, 0.2), 400))
+    assert slipping.model.noise.slip_along == pytest.approx(0.02, rel=0.5)
+    assert "slip at random" in slipping.suspicions[0]
     white = identify(logged(4, Noise(1e-3, 1e-2), 400))
     assert white.model.noise.correlation_time is None
     assert white.model.noise.position == pytest.approx(1e-3, rel=0.15)
