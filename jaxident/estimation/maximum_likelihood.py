@@ -18,10 +18,6 @@ from jaxident.robot.noise import Noise
 
 WINDOW = 200
 """Rows of the windows that the starter fits: long enough for a slow pole, too short for slip to pile up."""
-PART = 8
-"""Windows in a part, parts in a larger one, and so on: a run of two parts or more is searched in parts first, each with
-a start of its own. The starter's dead zones lie on a grid, and over thousands of rows what they are off by sums up to
-whole turns; where wheels slip a prediction does not reach as far."""
 MOST_STEPS = 100
 BLOCK = 4
 """Trials of a batch whose starters run at once: the paths of more leave the second-level cache."""
@@ -47,8 +43,7 @@ class Fit(NamedTuple):
 
 
 class Beginning(NamedTuple):
-    """Where searches begin, whatever the law: the starter's estimate, and states (runs, windows, 5) at the first row of
-    each of its windows."""
+    """Where searches begin, whatever the law: the starter's estimate, and states (runs, 5) at each run's first row."""
 
     estimate: Start
     starts: Any
@@ -64,8 +59,8 @@ def _begin(runs: Runs, d_max: Array) -> Beginning:
     windows = cut_windows(runs, min(WINDOW, runs.seen.shape[1]))
     pair = channels(windows)
     estimate = first_estimate(pair, windows, d_max)
-    starts = start_states(estimate, pair, windows)
-    return Beginning(estimate, starts.reshape(len(runs.seen), -1, starts.shape[-1]))
+    per_run = windows.seen.shape[0] // runs.seen.shape[0]
+    return Beginning(estimate, start_states(estimate, pair, windows)[::per_run])
 
 
 def first_point(beginning: Beginning, step: Array, law: Law) -> Point:
@@ -76,7 +71,7 @@ def first_point(beginning: Beginning, step: Array, law: Law) -> Point:
     slip = 0.1 / jnp.mean(step) ** 1.5
     noise = Noise(position, heading, 2.0 * jnp.mean(step), slip * position, slip * heading)
     drive = Physical(estimate.rate, estimate.gain, jnp.zeros(2) if law.coupling else None)
-    return Point(to_vector(Robot(drive, estimate.dead_zone, noise), law), starts[:, 0])
+    return Point(to_vector(Robot(drive, estimate.dead_zone, noise), law), starts)
 
 
 def fit_runs(runs: Runs, d_max: Array, law: Law = WHITE) -> Fit:
@@ -90,7 +85,7 @@ def fit_runs(runs: Runs, d_max: Array, law: Law = WHITE) -> Fit:
 @partial(jax.jit, static_argnames=("law",))
 def fit_from(beginning: Beginning, runs: Runs, d_max: Array, law: Law) -> Fit:
     """The estimate by a search from a given beginning."""
-    search = search_from(_nearer(beginning, runs, d_max, law), runs, law, d_max, MOST_STEPS)
+    search = search_from(first_point(beginning, runs.step, law), runs, law, d_max, MOST_STEPS)
     covariance = covariance_at(search.point, search.local, law)
     found = jax.vmap(lambda start, run: innovations(search.point.shared, start, run, law), in_axes=(0, run_axes(runs)))(
         search.point.starts, runs
@@ -104,17 +99,6 @@ def fit_from(beginning: Beginning, runs: Runs, d_max: Array, law: Law) -> Fit:
         ok=search.arrived & _regular(search, covariance, runs),
         steps=search.steps,
     )
-
-
-def _nearer(beginning: Beginning, runs: Runs, d_max: Array, law: Law) -> Point:
-    """The point where the search of whole runs begins: with long ones, where that of their parts ended."""
-    point, starts, rows = first_point(beginning, runs.step, law), beginning.starts, WINDOW
-    while not law.slip and runs.seen.shape[1] >= 2 * PART * rows:
-        starts, rows = starts[:, ::PART], PART * rows
-        point = point._replace(starts=starts.reshape(-1, starts.shape[-1]))
-        point = search_from(point, cut_windows(runs, rows), law, d_max, MOST_STEPS).point
-        starts = point.starts.reshape(starts.shape)
-    return point._replace(starts=starts[:, 0])
 
 
 def _regular(search: Search, covariance: Array, runs: Runs) -> Array:
