@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxident.array_types import AT_REST, State
+from jaxident.array_types import AT_REST, State, Wheels
 from jaxident.errors import InputError
 from jaxident.estimation import joint_filter
 from jaxident.estimation.filter import first_belief, scan_filter
@@ -37,11 +37,17 @@ def drive_of(values):
 def record(key, noise=NOISE, values=TRUTH, rows=ROWS, name="multilevel"):
     """Commands and poses (rows,) of a robot whose numbers (8,) or (8, rows) may change with time."""
     key, own = jax.random.split(key)
-    command, unit = EXCITATIONS[name](key, rows), draw_noise(own, rows)
+    command = EXCITATIONS[name](key, rows)
+    return command, poses(own, command, noise, values)
+
+
+def poses(key, command, noise=NOISE, values=TRUTH):
+    """What the camera sees of that robot under some commands (rows,)."""
+    rows = len(command.right)
     values = jnp.broadcast_to(jnp.asarray(values).reshape(8, -1), (8, rows))
     pull = force(drive_of(values), effective_command(command, values[6:]))
     state = run_forces(hold(drive_of(values[:, :-1]), jnp.full(rows - 1, PERIOD)), pull, AT_REST)
-    return command, observe(state.pose, noise, unit, jnp.asarray(PERIOD))
+    return observe(state.pose, noise, draw_noise(key, rows), jnp.asarray(PERIOD))
 
 
 def prior(share=0.02, values=TRUTH, noise=NOISE, **settings):
@@ -168,6 +174,14 @@ def test_every_cell_is_near_the_bound_from_its_own_start(name, millimetres):
     errors, sound = errors_over_bound(jax.random.split(jax.random.key(3), 200), name, noise, 200)
     assert sound.mean() >= 0.98
     assert np.sqrt(np.mean(errors[sound] ** 2, axis=0)).max() < 1.5
+
+
+def test_a_setup_that_leaves_a_parameter_open_is_not_sound():
+    """Of the left wheel's levels only 0.3 passes its dead zone of 0.2: any dead zone below has a gain that fits."""
+    levels = jnp.array([0.0, 0.5, -0.7, 0.3, 1.0]), jnp.array([0.1, 0.3, -0.3, 0.3, 0.0])
+    command = Wheels(*(jnp.repeat(level, 40) for level in levels))
+    run = Runs(jnp.asarray(PERIOD), command, poses(jax.random.key(0), command), jnp.ones(200, bool))
+    assert not start(run, D_MAX, jnp.inf, "white").sound
 
 
 @pytest.mark.parametrize("which", [pytest.param(1, marks=pytest.mark.slow), 5, pytest.param(6, marks=pytest.mark.slow)])
