@@ -94,7 +94,7 @@ def _suspicions(fit: Fit, law: Law, runs: Runs, noise_law: str) -> tuple[str, ..
             "wheels seem to slip at random: they do, or the model lacks something; `jaxident diagnose` tells which"
         )
     found = colour(fit, runs)
-    if found > WHITE:
+    if not found < WHITE:
         tried = "no noise law makes them white, so the model may lack something: `jaxident diagnose` looks for it"
         other = "the noise law 'auto' tries slip and a camera error with a memory"
         words = tried if noise_law == "auto" else other

@@ -81,8 +81,9 @@ def init(log: Log, *, d_max: Array, memory: Array = jnp.inf, noise_law: str = "w
     """State after a setup log of one run: maximum likelihood on it under a named noise law (`NOISE_LAWS`).
 
     d_max: largest dead zone [unit of the command]. memory [s]: how long the parameters remember; infinite for a robot
-    that does not change. A change is followed after about one memory of rich input. InputError for an unknown law or
-    several runs. Needs double precision.
+    that does not change. A change is followed after about one memory of rich input. A log that leaves a parameter open,
+    such as one with a single level above a dead zone, gives a state that is never `ok`. InputError for an unknown law
+    or several runs. Needs double precision.
     """
     require_float64("joint_filter.init")
     if noise_law not in NOISE_LAWS:

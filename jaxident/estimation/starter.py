@@ -58,7 +58,8 @@ class Start(NamedTuple):
 def first_estimate(pair: tuple[Channel, Channel], windows: Runs, d_max: Array) -> Start:
     """The best of LOOKS grids over dead zones in [0, d_max] and rates; windows (windows, rows) and their channels.
 
-    The first grid's best points, as many as FOLLOWED says, each lead to finer ones around them.
+    The first grid's best points, as many as FOLLOWED says, each lead to finer ones around them; if they are several,
+    MORE grids follow around the best of all.
     """
     rows, step = windows.seen.shape[1], jnp.mean(windows.step)
     counts = jnp.stack([jnp.sum(c.weight) * c.measured.shape[1] for c in pair])

@@ -87,7 +87,7 @@ def test_errors_stay_near_the_bound_and_intervals_cover():
 
 def test_a_dead_zone_on_a_level_of_the_input_is_arrived_at():
     """The left wheel's dead zone lies on a level of the staircase, where the cost has a kink: damped like all others it
-    takes 44 to 58 steps in one trial of seventeen."""
+    does not arrive in 100 steps in 6 of these 48 trials, and with an easier damping took 44 to 58."""
     _, over_own, ok, steps = trials("staircase", Noise(1e-3, 1e-2), Law(), 48)
     assert ok.all()
     assert steps.max() <= 40
@@ -156,12 +156,12 @@ def test_batch_is_the_loop_and_compiles_once():
 
 
 def test_a_long_run_is_found_in_few_steps():
-    """7 when damping ended at 1e-6 of the curvature, above that of a long run's flattest direction."""
+    """9 here, median of 16 records 8; 26 and 27 while damping ended at 1e-6, above a long run's flattest direction."""
     fit = jax.jit(lambda runs: fit_runs(runs, D_MAX))(
-        simulated(jax.random.key(2), "multilevel", Noise(1e-3, 1e-2), 8000)
+        simulated(jax.random.key(0), "multilevel", Noise(1e-3, 1e-2), 32000)
     )
     assert fit.ok
-    assert fit.steps <= 5
+    assert fit.steps <= 12
     error = natural_values(fit.robot, Law())[:8] - natural_values(Robot(DRIVE, DEAD_ZONE, Noise(1e-3, 1e-2)), Law())[:8]
     assert np.abs(error / jnp.sqrt(jnp.diagonal(fit.covariance))[:8]).max() < 4.0
 
