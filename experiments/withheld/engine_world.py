@@ -1,17 +1,25 @@
-"""The MJCF of a differential-drive robot: chassis, two driven wheels, two slippery castors, one floor.
+"""The MJCF of a differential-drive robot: chassis, two driven wheels on springs, two slippery castors, one floor.
 
 The plain robot is near the nominal model: the motors brake in proportion to their speed, contact is stiff, the castors
 are free of friction, the masses are balanced about the axle. Every hidden effect is a change of `Body` or of the
 engine's world, never of the equations of the package.
+
+The springs keep a sliding wheel's load what it is. The engine solves load and friction of a contact as one convex
+problem, which presses a wheel the more the faster it slides: rigidly mounted, the wheels of a robot with little grip
+hopped, their load swung by its own size, and halving the engine's step moved the path by millimetres. A wheel that is
+light beside what presses it cannot be pressed so: it moves away instead.
 """
 
 from typing import NamedTuple
 
-TIMESTEP = 1e-3
+TIMESTEP, GRAVITY = 1e-3, 9.81
 STIFF, CLOSE = "0.002 1", "0.95 0.99 0.0005"
 GRASP = 1.8 / TIMESTEP
 """Damping of slip at the wheels [1/s]. The engine holds them without the turning of their axes, which lets them creep
 outwards at v w (1 / damping - step / 2): little at this value, which is still stable."""
+
+SPRING, CARRIED = 200.0, 0.6
+"""Stiffness under each wheel [N/m], and how much of the chassis both carry."""
 
 
 class Body(NamedTuple):
@@ -39,8 +47,7 @@ class Body(NamedTuple):
 
 def world(body: Body) -> str:
     """The whole model as text."""
-    g = 9.81
-    gravity = f"{g * body.tilt[0]:.9g} {g * body.tilt[1]:.9g} {-g:.9g}"
+    gravity = f"{GRAVITY * body.tilt[0]:.9g} {GRAVITY * body.tilt[1]:.9g} {-GRAVITY:.9g}"
     ball = 0.4 * body.radius
     wheels, tyres, actuators, tendons = "", "", "", ""
     for k, side in enumerate("rl"):
@@ -80,8 +87,10 @@ def _wheel(body: Body, k: int, side: str) -> str:
     place = (-0.5 if side == "r" else 0.5) * body.track
     loose = body.play[k] > 0.0
     armature = 0.0 if loose else body.rotor
+    critical, pressed = 2.0 * (SPRING * body.wheel_mass) ** 0.5, 0.5 * CARRIED * body.mass * GRAVITY / SPRING
     wheel = (
-        f'<body pos="0 {place} 0"><joint name="hinge_{side}" axis="0 1 0" armature="{armature}" '
+        f'<body pos="0 {place} 0"><joint type="slide" axis="0 0 1" stiffness="{SPRING}" damping="{critical}" '
+        f'springref="{-pressed}"/><joint name="hinge_{side}" axis="0 1 0" armature="{armature}" '
         f'frictionloss="{body.dry[k]}"/><geom name="tyre_{side}" type="ellipsoid" mass="{body.wheel_mass}" '
         f'size="{body.radius} 0.008 {body.radius}"/></body>'
     )

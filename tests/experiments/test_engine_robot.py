@@ -5,7 +5,7 @@ import pytest
 
 pytest.importorskip("mujoco")
 
-from withheld import engine_cases, robots
+from withheld import engine_cases, engine_robot, engine_world, robots
 from withheld.engine_robot import Driver, simulate
 from withheld.engine_world import Body
 
@@ -46,6 +46,16 @@ def test_a_payload_counts_from_its_instant_on(plain):
     later = run(driver=Driver(payload=2.0, instant=10.0 + 30 * PERIOD), session_time=10.0)
     assert np.array_equal(later[:31], plain[:31])
     assert np.abs(later[-1] - plain[-1]).max() > 1e-3
+
+
+def test_wheels_that_slide_move_the_robot_the_same_at_half_the_engine_s_step(monkeypatch, plain):
+    """Without springs the wheels hop on the floor, and half the step moves the robot by 6 mm in this second."""
+    slippery = Body(grip=0.05)
+    whole, half = run(slippery), 0.5 * engine_world.TIMESTEP
+    for module in (engine_world, engine_robot):
+        monkeypatch.setattr(module, "TIMESTEP", half)
+    assert np.abs(whole - plain)[:, :2].max() > 0.02
+    assert np.abs(whole - run(slippery))[:, :2].max() < 5e-4
 
 
 @pytest.mark.parametrize("name", list(engine_cases.LAWS))
