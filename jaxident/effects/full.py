@@ -12,17 +12,18 @@ from jaxident.effects.actuation import input_quantisation, input_saturation, los
 from jaxident.effects.catalogue import CATALOGUE, by_name
 from jaxident.effects.input_chain import at_rest, push
 from jaxident.effects.intervals import Grid, make_grid
-from jaxident.effects.substep import ADDED, FRICTION, Motion, after_half, move, solve_half, wheel_speeds
-from jaxident.robot.drive import Force, Physical, advance, force, hold
+from jaxident.effects.substep import ADDED, FRICTION, Motion, after_half, move, solve_half
+from jaxident.robot.drive import Force, Physical, advance, force, hold, wheel_speeds
 from jaxident.robot.noise import Noise, correlated, draw_noise, observe, slip
 
 SUBSTEPS = 4
 """Per camera interval; enough for 1e-6 m in a run of 200 samples where the effects are smooth."""
 
 SHARP_SUBSTEPS = 16
-"""Where an effect has corners within a sample (friction, stiction, play, slew, the |w| of turn_loss)."""
+"""Where an effect has corners within a sample (friction, stiction, play, slew, the |w| of turn_loss, a wheel that
+begins to slide)."""
 
-SHARP = FRICTION | {"turn_loss", "backlash", "input_rate_limit"}
+SHARP = FRICTION | {"turn_loss", "backlash", "input_rate_limit", "traction_limit"}
 MOVING = (
     FRICTION | ADDED | {"backlash", "input_rate_limit", "motor_lag", "lateral_slip", "gain_drift", "dead_zone_drift"}
 )
@@ -128,7 +129,7 @@ def _scan(settings, drive, dead_zone, grid: Grid, slips: Force | None, start: St
     length = grid.spread(grid.step)
 
     def interval(carry, now):
-        state, memory = carry
+        state, memory, excess = carry
         begin, h, target, shove, changed, solution = now
 
         def speeds(pushed: Wheels) -> Wheels:
@@ -137,18 +138,19 @@ def _scan(settings, drive, dead_zone, grid: Grid, slips: Force | None, start: St
 
         pushed, memory = push(settings, dead_zone, memory, target, begin, h, speeds)
         if moving:
-            after = move(settings, drive, state, pushed, shove, changed, solution, h)
+            after, excess = move(settings, drive, state, excess, pushed, shove, changed, solution, h)
         else:
             pull = force(drive, pushed.mean)
             if shove is not None:
                 pull = Force(pull.along + shove.along, pull.heading + shove.heading)
             after = advance(state, pull, solution)
-        return (after, memory), state
+        return (after, memory, excess), state
 
     like = jnp.zeros_like(grid.start, shape=())
     begin = State(*(jnp.asarray(s, like.dtype) for s in start))
     inputs = (grid.start + offset, length, grid.command, slips, grid.changed, solved)
-    (last, _), states = jax.lax.scan(interval, (begin, at_rest(settings, like)), inputs)
+    still = Wheels(like, like)
+    (last, _, _), states = jax.lax.scan(interval, (begin, at_rest(settings, like), still), inputs)
     return State(*(jnp.append(column, end) for column, end in zip(states, last, strict=True)))
 
 

@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 
 from jaxident.array_types import Array, State, Wheels
-from jaxident.effects.contact import lateral_slip, slope, traction_limit
+from jaxident.effects.contact import Skid, lateral_slip, lost_push, skid, slope, traction_limit
 from jaxident.effects.drive import dry_friction, friction_level, mass_offset, quadratic_drag, turn_loss
 from jaxident.effects.input_chain import Push
 from jaxident.effects.time import payload_change
-from jaxident.numerics import safe_divide, sin_cos
-from jaxident.robot.drive import Force, Physical, Response, force, responses, weigh
+from jaxident.numerics import sin_cos
+from jaxident.robot.drive import Force, Physical, Response, force, responses, to_wheels, weigh, wheel_speeds
 
 
 class Motion(NamedTuple):
@@ -46,9 +46,11 @@ def solve_half(drive: Physical, step: Array) -> Half:
     return Half(v, w, turn)
 
 
-def move(settings, drive: Physical, state: State, push: Push, slip: Force | None, changed, half: Half, h) -> State:
+def move(
+    settings, drive: Physical, state: State, excess: Wheels, push: Push, slip: Force | None, changed, half: Half, h
+) -> tuple[State, Wheels]:
     """The state one substep of h [s] later, under a push, a random slip (acceleration) and before or after a payload
-    change.
+    change, and by how much each wheel then turns faster than the ground; `excess`: by how much it did.
 
     Friction, held over the substep, moves what the departure depends on, and the other way round: it is settled with
     a first guess of the departure, and again with the departure that follows.
@@ -59,12 +61,18 @@ def move(settings, drive: Physical, state: State, push: Push, slip: Force | None
     ramp = None if push.slope is None else force(drive, push.slope)
     lightness = None if changed is None else payload_change(changed, settings["payload_change"]["ratio"])
     departs = ramp is not None or bool(settings.keys() & ADDED)
+    start, sliding = Motion(state.v, state.w, state.theta), None
 
     def departure(part: float, now: Motion) -> Motion:
         later = None if ramp is None else Force(*((part - 0.5) * f for f in ramp))
-        return _departure(settings, drive, now, pull, later, lightness)
+        return _departure(settings, drive, now, pull, later, lightness, sliding)
 
-    start = Motion(state.v, state.w, state.theta)
+    if "traction_limit" in settings:
+        first = _asked(drive, start, pull, ramp, -0.5)
+        sliding = _sliding(settings, excess, first, first, h)
+        end = _sum(after_half(half, after_half(half, start, pull), pull), (1.0, _guess(departure, start, half, h)))
+        sliding = _sliding(settings, excess, first, _asked(drive, end, pull, ramp, 0.5), h)
+        excess = Wheels(*(own.excess for own in sliding))
     held, path = pull, None
     if settings.keys() & FRICTION:
         guess = _guess(departure, start, half, h) if settings.keys() & ADDED else None
@@ -73,7 +81,20 @@ def move(settings, drive: Physical, state: State, push: Push, slip: Force | None
         path = _runge_kutta(drive, departure, start, held, half, h)
         if settings.keys() & FRICTION:
             held = _rubbed(settings, drive, start, pull, path[2], lightness, half)
-    return _arrive(settings, drive, state, held, path, half, h)
+    return _arrive(settings, drive, state, held, path, half, h), excess
+
+
+def _sliding(settings, excess: Wheels, first: Wheels, last: Wheels, h: Array) -> list[Skid]:
+    """How both wheels slide over the substep, given their net pushes at its start and its end."""
+    law, sides = settings["traction_limit"], zip(excess, first, last, strict=True)
+    return [skid(e, c, 0.5 * (c + later), h, law["limit"], law["spin"]) for e, c, later in sides]
+
+
+def _asked(drive: Physical, now: Motion, pull: Force, ramp: Force | None, place: float) -> Wheels:
+    """The net push of each wheel at some place of the substep: what accelerates a robot that rolls, in commands."""
+    later = (0.0, 0.0) if ramp is None else (place * f for f in ramp)
+    linear = _linear(drive, now.v, now.w)
+    return to_wheels(drive, *(a + b + c for a, b, c in zip(linear, pull, later, strict=True)))
 
 
 def _guess(departure, start: Motion, half: Half, h: Array) -> Motion:
@@ -82,8 +103,10 @@ def _guess(departure, start: Motion, half: Half, h: Array) -> Motion:
     return Motion(*(h * part for part in moved))
 
 
-def _departure(settings, drive: Physical, now: Motion, pull: Force, ramp: Force | None, lightness) -> Motion:
-    """N: acceleration with all effects less that of the linear drive under the held pull."""
+def _departure(
+    settings, drive: Physical, now: Motion, pull: Force, ramp: Force | None, lightness, sliding: list[Skid] | None
+) -> Motion:
+    """N: acceleration with all effects less that of the linear drive under the held pull; `sliding` of dry wheels."""
     v, w, theta = now
     along, heading = jnp.zeros_like(v), jnp.zeros_like(w)
     if ramp is not None:
@@ -91,9 +114,7 @@ def _departure(settings, drive: Physical, now: Motion, pull: Force, ramp: Force 
     if "traction_limit" in settings or lightness is not None:
         asked = Force(*(a + b + c for a, b, c in zip(_linear(drive, v, w), pull, (along, heading), strict=True)))
         if "traction_limit" in settings:
-            wheels = to_wheels(drive, *asked)
-            taken = (traction_limit(c, settings["traction_limit"]["limit"]) - c for c in wheels)
-            lost = force(drive, Wheels(*taken))
+            lost = force(drive, _not_taken(settings["traction_limit"], to_wheels(drive, *asked), sliding))
             factor = 1.0 if lightness is None else lightness
             along, heading = along + factor * lost.along, heading + factor * lost.heading
         if lightness is not None:
@@ -101,6 +122,13 @@ def _departure(settings, drive: Physical, now: Motion, pull: Force, ramp: Force 
     for more in _smooth(settings, v, w, theta):
         along, heading = along + more.along, heading + more.heading
     return Motion(along, heading, jnp.zeros_like(theta))
+
+
+def _not_taken(law, wheels: Wheels, sliding: list[Skid] | None) -> Wheels:
+    """What the ground does not take of each wheel's net push, negative."""
+    limit, dry = law["limit"], law["dry"]
+    pairs = zip(wheels, sliding or [Skid(0.0, 0.0, 0.0)] * 2, strict=True)
+    return Wheels(*(lost_push(c, traction_limit(c, limit), limit, dry, own) for c, own in pairs))
 
 
 def _smooth(settings, v: Array, w: Array, theta: Array) -> list[Force]:
@@ -204,20 +232,6 @@ def _linear(drive: Physical, v: Array, w: Array) -> tuple[Array, Array]:
     if drive.coupling is None:
         return -drive.rate[0] * v, -drive.rate[1] * w
     return -drive.rate[0] * v + drive.coupling[0] * w, -drive.rate[1] * w + drive.coupling[1] * v
-
-
-def to_wheels(drive: Physical, along: Array, heading: Array) -> Wheels:
-    """gain^-1 [along, heading]: what at the wheels [unit] gives these accelerations; 0 for a singular gain."""
-    (a, b), (c, d) = drive.gain
-    determinant = a * d - b * c
-    return Wheels(
-        safe_divide(d * along - b * heading, determinant, 0.0), safe_divide(a * heading - c * along, determinant, 0.0)
-    )
-
-
-def wheel_speeds(drive: Physical, v: Array, w: Array) -> Wheels:
-    """Speed of each wheel as the command that holds it."""
-    return to_wheels(drive, drive.rate[0] * v, drive.rate[1] * w)
 
 
 def after_half(half: Half, now: Motion, held: Force | None = None) -> Motion:

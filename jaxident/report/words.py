@@ -25,7 +25,7 @@ EFFECTS = {
     "quadratic_drag": "drag that grows with the square of the speed",
     "mass_offset": "the centre of mass lies off the axle",
     "turn_loss": "speed is lost while turning",
-    "traction_limit": "the wheels' grip on the floor is limited",
+    "traction_limit": "the wheels push no harder than their grip on the floor, or the motors' current, allows",
     "lateral_slip": "the robot drifts outwards in curves",
     "slope": "the floor is not level",
     "gain_drift": "the drive grows weaker or stronger with time, as when a battery runs down",

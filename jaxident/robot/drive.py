@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array, State, Wheels
-from jaxident.numerics import GAUSS_NODES, GAUSS_WEIGHTS, hold_integrals, sin_cos
+from jaxident.numerics import GAUSS_NODES, GAUSS_WEIGHTS, hold_integrals, safe_divide, sin_cos
 
 DOUBLINGS = 8
 TERMS = 12
@@ -68,6 +68,20 @@ def force(physical: Physical, passed: Wheels) -> Force:
         along_r * passed.right + along_l * passed.left,
         heading_r * passed.right + heading_l * passed.left,
     )
+
+
+def to_wheels(drive: Physical, along: Array, heading: Array) -> Wheels:
+    """gain^-1 [along, heading]: what at the wheels [unit] gives these accelerations; 0 for a singular gain."""
+    (a, b), (c, d) = drive.gain
+    determinant = a * d - b * c
+    return Wheels(
+        safe_divide(d * along - b * heading, determinant, 0.0), safe_divide(a * heading - c * along, determinant, 0.0)
+    )
+
+
+def wheel_speeds(drive: Physical, v: Array, w: Array) -> Wheels:
+    """Speed of each wheel as the command that holds it."""
+    return to_wheels(drive, drive.rate[0] * v, drive.rate[1] * w)
 
 
 def hold(physical: Physical, step: Array) -> Hold:

@@ -63,7 +63,12 @@ def test_without_effects_it_is_the_nominal_robot(log, follow):
     np.testing.assert_allclose(follow(nominal()), simulated(log), atol=3e-4)
 
 
-CASES = [(name, {}) for name in COORDINATES] + [("backlash", {"coasting": 1.0})]
+FORMS = [
+    ("backlash", {"coasting": 1.0}),
+    ("traction_limit", {"dry": 1.0}),
+    ("traction_limit", {"dry": 1.0, "spin": 0.03}),
+]
+CASES = [(name, {}) for name in COORDINATES] + FORMS
 
 
 @pytest.mark.parametrize(("name", "form"), CASES)

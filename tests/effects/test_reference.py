@@ -53,6 +53,19 @@ def test_a_wheel_that_coasts_in_its_play():
     assert np.abs(found - wanted).max() < tolerance(("backlash",))
 
 
+@pytest.mark.parametrize("spin", [0.0, 0.02])
+def test_a_dry_wheel_that_slides(spin):
+    law, log = {"limit": 0.5, "dry": 1.0, "spin": spin}, drive_log()
+    found = full(to_vector([Effect("traction_limit", law)]), log, substeps=substeps_for(frozenset({"traction_limit"})))
+    command = np.array(log.u_r), np.array(log.u_l)
+    wanted, yields = (
+        simulate_reference(PARAMETERS, {"traction_limit": each}, log.t, *command, START, step=1e-3)
+        for each in (law, {"limit": 0.5})
+    )
+    assert np.abs(yields - wanted).max() > 0.3
+    assert np.abs(found - wanted).max() < 1e-4
+
+
 @pytest.mark.parametrize("names", [pytest.param(s, marks=[pytest.mark.slow] * (len(s) == 1)) for s in SETS])
 def test_a_program_of_these_effects_alone_does_the_same(names):
     log = drive_log()

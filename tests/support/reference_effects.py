@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-X, Y, THETA, V, W, Q_R, Q_L, P_R, P_L = range(9)
+X, Y, THETA, V, W, Q_R, Q_L, P_R, P_L, E_R, E_L = range(11)
 TINY = 1e-12
 
 
@@ -27,7 +27,7 @@ def simulate_reference(parameters, effects, t, u_r, u_l, start, *, session_time=
     change = effects.get("payload_change", {}).get("instant", 0.0) - session_time + t[0]
     stops = np.unique(np.concatenate([t, arrivals, [change]]))
     stops = stops[(stops >= t[0]) & (stops <= t[-1])]
-    state, rows = np.array([*start, 0.0, 0.0, 0.0, 0.0]), [start[:3]]
+    state, rows = np.array([*start, *[0.0] * 6]), [start[:3]]
     for begin, end in itertools.pairwise(stops):
         middle = 0.5 * (begin + end)
         index = np.searchsorted(arrivals, middle) - 1
@@ -77,6 +77,8 @@ class Robot:
         """From now to `end`, or to the first event before."""
         engaged, event = self.play(state, now)
         end = min(end, event)
+        if self.of("traction_limit", "dry"):
+            return self.skid(state, now, end, engaged)
         if not self.rubs:
             return end, self.advance(state, now, end - now, engaged, (0, 0))
         modes = self.friction_modes(state, now, engaged)
@@ -169,7 +171,10 @@ class Robot:
         driving = push if self.lag == 0.0 else state[[Q_R, Q_L]]
         along = self.system @ [v, w] + self.gain @ driving
         limit = self.of("traction_limit", "limit", math.inf)
-        if math.isfinite(limit):
+        if self.of("traction_limit", "dry"):
+            asked, slides = self.inverse @ along, self.sliding(state, self.inverse @ along)
+            along = self.gain @ np.where(slides == 0, asked, limit * slides)
+        elif math.isfinite(limit):
             along = self.gain @ (limit * np.tanh(self.inverse @ along / limit))
         along = along * self.lightness()
         along[0] -= self.of("quadratic_drag", "along") * v * abs(v) + self.of("turn_loss", "loss") * abs(w) * v
@@ -178,6 +183,40 @@ class Robot:
         along[1] -= self.of("mass_offset", "heading") * v * w
         along[0] += self.of("slope", "acceleration") * math.cos(theta - self.of("slope", "direction"))
         return along, push
+
+    def sliding(self, state, asked):
+        """Where each dry wheel slides to; 0 for one that rolls."""
+        limit, excess = self.of("traction_limit", "limit"), state[[E_R, E_L]]
+        return np.where(excess != 0.0, np.sign(excess), np.where(np.abs(asked) > limit, np.sign(asked), 0.0))
+
+    def asked(self, state, now, engaged):
+        """The net push of each wheel that rolls."""
+        driving = np.where(engaged, self.pushes(now), 0.0) if self.lag == 0.0 else state[[Q_R, Q_L]]
+        return self.inverse @ (self.system @ state[[V, W]] + self.gain @ driving)
+
+    def spin(self, state, now, h, engaged):
+        """h [s] later, each wheel that slides turning as its inertia says, whether or not it was caught."""
+        new = self.advance(state, now, h, engaged, (0, 0))
+        asked = self.asked(state, now, engaged), self.asked(new, now + h, engaged)
+        slides, spin = self.sliding(state, asked[0]), self.of("traction_limit", "spin")
+        if spin > 0.0:
+            middle = 0.5 * (asked[0] + asked[1]) - self.of("traction_limit", "limit") * slides
+            after = middle + (state[[E_R, E_L]] - middle) * math.exp(-h / spin)
+            new[[E_R, E_L]] = np.where(slides == 0, 0.0, after)
+        return new
+
+    def skid(self, state, now, end, engaged):
+        """From now to `end`, or to where the first wheel is caught."""
+        sign = np.sign(state[[E_R, E_L]])
+        new, low, high = self.spin(state, now, end - now, engaged), 0.0, end - now
+        if np.any(sign * new[[E_R, E_L]] < 0.0):
+            for _ in range(30):
+                middle = 0.5 * (low + high)
+                new = self.spin(state, now, middle, engaged)
+                low, high = (low, middle) if np.any(sign * new[[E_R, E_L]] < 0.0) else (middle, high)
+            new = self.spin(state, now, high, engaged)
+            new[[E_R, E_L]] = np.where(sign * new[[E_R, E_L]] < 0.0, 0.0, new[[E_R, E_L]])
+        return now + max(high, TINY), new
 
     def rubbing(self, n, modes):
         fade = self.of("stiction", "fade", 0.05)
@@ -202,7 +241,7 @@ class Robot:
             acceleration = acceleration - self.lightness() * self.gain @ friction
         theta, v, w = state[THETA], state[V], state[W]
         side = -self.of("lateral_slip", "slip") * v * w
-        ds = np.zeros(9)
+        ds = np.zeros(11)
         ds[X] = v * math.cos(theta) - side * math.sin(theta)
         ds[Y] = v * math.sin(theta) + side * math.cos(theta)
         ds[THETA] = w

@@ -19,7 +19,7 @@ from jaxident.diagnosis.motion.linear import explained, follow, gram, left_over,
 
 STEPS = np.geomspace(0.02, 0.4, 96)
 """Steps of a quantised command where nothing suggests better ones, in largest commands."""
-FORMED = ("backlash",)
+FORMED = ("backlash", "traction_limit")
 """Effects with a derivative at neutral that says nothing of another form of theirs."""
 LENS, CENTRES = 0.01, 6
 """Strength [1/m^2] of a lens, and places along each axis of the field where its centre is looked for."""
@@ -45,6 +45,8 @@ def seeds(name: str, duration: float, steps: Iterable[float] = STEPS) -> list[di
         return [{"loss": 0.1, "instant": duration * part} for part in np.linspace(0.06, 0.94, 12)]
     if name == "backlash":
         return [{}, {"right": 0.02, "left": 0.02, "coasting": 1.0}]
+    if name == "traction_limit":
+        return [{}, {"inverse_square": 2.0, "dry": 1.0, "spin": 0.02}]
     return [{}]
 
 

@@ -56,7 +56,11 @@ COORDINATES: dict[str, tuple[Coordinate, ...]] = {
     "quadratic_drag": (Coordinate("along", 0.0, 0.0, 100.0, 3.0), _positive("heading", 5.0)),
     "mass_offset": (_signed("along", 0.4), _signed("heading", 40.0)),
     "turn_loss": (Coordinate("loss", 0.0, 0.0, 50.0, 0.6),),
-    "traction_limit": (_positive("inverse_square", 100.0),),
+    "traction_limit": (
+        _positive("inverse_square", 100.0),
+        Coordinate("dry", 0.0, 0.0, 1.0, 1.0),
+        Coordinate("spin", 0.0, 0.0, 0.3, 0.02),
+    ),
     "lateral_slip": (_signed("slip", 0.5),),
     "slope": (_signed("x", 3.0), _signed("y", 3.0)),
     "gain_drift": (_signed("rate", 0.05),),
@@ -80,10 +84,11 @@ SMOOTH = tuple(
 )  # fmt: skip
 """Effects whose score is a derivative at neutral; the others are looked for from `seeds`."""
 
-STEPPED = {("input_quantisation", "step"), ("backlash", "coasting")}
+STEPPED = {("input_quantisation", "step"), ("backlash", "coasting"), ("traction_limit", "dry")}
 """Coordinates that poses follow in jumps, or that choose between two forms: looked for on a grid alone."""
 
-SHAPES = {("stiction", "fade"), ("payload_change", "instant"), ("backlash", "coasting")}
+SHAPES = {("stiction", "fade"), ("payload_change", "instant"), ("backlash", "coasting"), ("traction_limit", "dry"),
+          ("traction_limit", "spin")}  # fmt: skip
 """Coordinates that shape an effect, whatever its size, and do nothing alone."""
 
 SILENT = SHAPES | {("lens_distortion", "pull_x"), ("lens_distortion", "pull_y")}
@@ -133,7 +138,8 @@ def to_catalogue(name: str, values: Mapping[str, float]) -> dict[str, float]:
     if name == "input_rate_limit":
         return {"rate": _inverse(values["inverse_rate"])}
     if name == "traction_limit":
-        return {"limit": _inverse(np.sqrt(max(values["inverse_square"], 0.0)))}
+        limit = _inverse(np.sqrt(max(values["inverse_square"], 0.0)))
+        return {"limit": limit, "dry": float(values["dry"]), "spin": float(values["spin"])}
     if name == "slope":
         return {
             "acceleration": float(np.hypot(values["x"], values["y"])),
@@ -153,7 +159,8 @@ def from_catalogue(name: str, values: Mapping[str, float]) -> dict[str, float]:
     if name == "input_rate_limit":
         return {"inverse_rate": 1.0 / values["rate"]}
     if name == "traction_limit":
-        return {"inverse_square": values["limit"] ** -2}
+        shape = {key: values.get(key, 0.0) for key in ("dry", "spin")}
+        return {"inverse_square": values["limit"] ** -2, **shape}
     if name == "slope":
         g, angle = values["acceleration"], values["direction"]
         return {"x": g * np.cos(angle), "y": g * np.sin(angle)}

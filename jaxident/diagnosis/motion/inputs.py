@@ -18,10 +18,9 @@ from jaxident.effects.actuation import (
     input_saturation,
     motor_lag,
 )
-from jaxident.effects.substep import wheel_speeds
 from jaxident.effects.time import dead_zone_drift, gain_drift
 from jaxident.numerics import safe_divide
-from jaxident.robot.drive import Physical, force
+from jaxident.robot.drive import Physical, force, wheel_speeds
 
 PUSHING = (
     "asymmetric_dead_zone", "direction_gain", "input_saturation", "input_quantisation", "input_rate_limit",

@@ -14,11 +14,10 @@ from jaxident.diagnosis.motion.coordinates import by_effect
 from jaxident.diagnosis.motion.inputs import SUBSTEPS, Push, pushes
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects import camera
-from jaxident.effects.contact import lateral_slip
+from jaxident.effects.contact import Skid, lateral_slip, lost_push, skid
 from jaxident.effects.drive import friction_level, mass_offset, quadratic_drag, slide, turn_loss
-from jaxident.effects.substep import wheel_speeds
 from jaxident.numerics import hold_integrals, safe_divide, sin_cos, wrap
-from jaxident.robot.drive import Physical
+from jaxident.robot.drive import Physical, to_wheels, wheel_speeds
 
 
 class Track(NamedTuple):
@@ -89,26 +88,32 @@ def move(vector: Array, settings, push: Push, starts: Array, windows: Windows) -
     begin = time + jnp.cumsum(windows.step, axis=0) - windows.step
     loss, instant = settings["payload_change"]["loss"], settings["payload_change"]["instant"]
 
-    def body(state, row):
+    def body(carry, row):
         mean, slope, part, lags, begin = row
-        after = state
+        after, excess = carry
         for number in range(SUBSTEPS):
             middle = begin + (number + 0.5) * part
             lightness = 1.0 - loss * jax.nn.sigmoid((middle - instant) / part)
-            after = _substep(settings, drive, after, (mean[number], slope[number]), part, lags, lightness)
-        return after, state
+            push = mean[number], slope[number]
+            after, excess = _substep(settings, drive, after, excess, push, part, lags, lightness)
+        return (after, excess), carry[0]
 
-    return Track(*jax.lax.scan(body, tuple(starts), (push.mean, push.slope, part, lags, begin))[1])
+    rolling = [jnp.zeros_like(starts[0])] * 2
+    return Track(*jax.lax.scan(body, (tuple(starts), rolling), (push.mean, push.slope, part, lags, begin))[1])
 
 
-def _substep(settings, drive: Physical, state, push, part: Array, lags, lightness: Array):
-    """The state one substep later."""
+def _substep(settings, drive: Physical, state, excess, push, part: Array, lags, lightness: Array):
+    """The state one substep later, and by how much the wheels then turn faster than the ground; `excess`: they did."""
     x, y, theta, v, w = state
     (mean, slope), (lag_v, lag_w) = push, lags
     pull, ramp = _force(drive, mean), _force(drive, slope)
-    first = _added(settings, drive, (theta, v, w), pull, ramp, -0.5, lightness)
+    asked = _asked(drive, v, w, pull, ramp, -0.5)
+    sliding = _sliding(settings, excess, asked, asked, part)
+    first = _added(settings, drive, (theta, v, w), pull, ramp, -0.5, lightness, sliding)
     middle = _ahead(state, lag_v.half, lag_w.half, [f + n for f, n in zip(pull, first, strict=True)], 0.5 * part, None)
-    more = _added(settings, drive, middle, pull, ramp, 0.0, lightness)
+    later = _asked(drive, middle[1], middle[2], pull, ramp, 0.0)
+    sliding = _sliding(settings, excess, asked, later, part)
+    more = _added(settings, drive, middle, pull, ramp, 0.0, lightness, sliding)
     pull = [f + n for f, n in zip(pull, more, strict=True)]
     _, free_v, free_w = _ahead(state, lag_v.whole, lag_w.whole, pull, part, ramp)
     rub = _friction(settings, drive, (v, w), (free_v, free_w), lags, lightness)
@@ -122,7 +127,7 @@ def _substep(settings, drive: Physical, state, push, part: Array, lags, lightnes
         left = lateral_slip(speed, turning, slip)
         x_rate = x_rate + weight * (speed * cosine - left * sine)
         y_rate = y_rate + weight * (speed * sine + left * cosine)
-    return x + part / 6.0 * x_rate, y + part / 6.0 * y_rate, *end
+    return (x + part / 6.0 * x_rate, y + part / 6.0 * y_rate, *end), [own.excess for own in sliding]
 
 
 def _force(drive: Physical, m) -> list[Array]:
@@ -142,17 +147,40 @@ def _ahead(state, lag_v, lag_w, pull, time: Array, ramp):
     return turned - ramp[1] * time**2 / 12.0, faster, turning + ramp[1] * (twice_w / time - 0.5 * once_w)
 
 
-def _added(settings, drive: Physical, now, pull, ramp, place: float, lightness: Array) -> list[Array]:
+def _linear(drive: Physical, v: Array, w: Array, pull, ramp, place: float) -> tuple[Array, Array]:
+    """Accelerations of the linear drive at some place of a substep, -1/2 its start, 1/2 its end."""
+    return (
+        pull[0] + place * ramp[0] - drive.rate[0] * v + drive.coupling[0] * w,
+        pull[1] + place * ramp[1] - drive.rate[1] * w + drive.coupling[1] * v,
+    )
+
+
+def _asked(drive: Physical, v: Array, w: Array, pull, ramp, place: float) -> Wheels:
+    """The net push of each wheel at some place of a substep."""
+    return to_wheels(drive, *_linear(drive, v, w, pull, ramp, place))
+
+
+def _limit(settings) -> Array:
+    """That of traction; infinite where there is none."""
+    inverse = settings["traction_limit"]["inverse_square"]
+    return jnp.where(inverse > 0.0, jnp.sqrt(1.0 / jnp.where(inverse > 0.0, inverse, 1.0)), jnp.inf)
+
+
+def _sliding(settings, excess, start: Wheels, middle: Wheels, part: Array) -> list[Skid]:
+    """How wheels slide over a substep, given their net pushes at its start and in its middle."""
+    limit, spin = _limit(settings), settings["traction_limit"]["spin"]
+    return [skid(*own, part, limit, spin) for own in zip(excess, start, middle, strict=True)]
+
+
+def _added(settings, drive: Physical, now, pull, ramp, place: float, lightness: Array, sliding) -> list[Array]:
     """Accelerations by effects, dry friction left out."""
     theta, v, w = now
     across = drive.coupling[0] * w, drive.coupling[1] * v
-    along = pull[0] + place * ramp[0] - drive.rate[0] * v + across[0]
-    heading = pull[1] + place * ramp[1] - drive.rate[1] * w + across[1]
-    (a, b), (c, d) = drive.gain
-    determinant = a * d - b * c
-    asked = (d * along - b * heading) / determinant, (a * heading - c * along) / determinant
-    missing = [_traction_loss(n, settings["traction_limit"]["inverse_square"]) for n in asked]
-    lost = _force(drive, missing)
+    along, heading = _linear(drive, v, w, pull, ramp, place)
+    asked, law = to_wheels(drive, along, heading), settings["traction_limit"]
+    taken = [n + _traction_loss(n, law["inverse_square"]) for n in asked]
+    wheels = zip(asked, taken, sliding, strict=True)
+    lost = _force(drive, [lost_push(n, m, _limit(settings), law["dry"], own) for n, m, own in wheels])
     terms = [
         quadratic_drag(v, w, **settings["quadratic_drag"]),
         mass_offset(v, w, **settings["mass_offset"]),
