@@ -9,6 +9,7 @@ from scipy.integrate import quad
 from jaxident.numerics import (
     GAUSS_NODES,
     GAUSS_WEIGHTS,
+    add_pairs,
     hold_integrals,
     in_blocks,
     require_float64,
@@ -41,6 +42,21 @@ def test_sin_cos_has_the_textbook_gradient_where_its_branches_meet():
     sine, cosine = jax.jit(lambda a: jax.jvp(sin_cos, (a,), (jnp.ones_like(a),))[1])(angle)
     np.testing.assert_allclose(sine, np.cos(angle), atol=1e-15)
     np.testing.assert_allclose(cosine, -np.sin(angle), atol=1e-15)
+
+
+@pytest.mark.parametrize("shape", [(), (20,)])
+def test_sums_and_derivatives_of_pairs(shape):
+    terms = jnp.asarray(np.random.default_rng(0).normal(size=(2, 4, *shape)))
+
+    def mixed(terms):
+        x, y = add_pairs(list(terms[0]), list(terms[1]))
+        return jnp.sum(x * x + 3.0 * y)
+
+    np.testing.assert_allclose(jnp.stack(jax.jit(add_pairs)(*map(list, terms))), terms.sum(axis=1), rtol=1e-15)
+    gradient = jax.grad(mixed)(terms)
+    np.testing.assert_allclose(gradient[0], jnp.broadcast_to(2.0 * terms[0].sum(axis=0), (4, *shape)), rtol=1e-15)
+    np.testing.assert_allclose(gradient[1], 3.0)
+    np.testing.assert_allclose(jax.jacfwd(mixed)(terms), gradient, rtol=1e-15)
 
 
 def hold_reference(rate: float, time: float) -> tuple[float, float, float]:

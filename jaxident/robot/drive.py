@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array, State, Wheels
-from jaxident.numerics import GAUSS_NODES, GAUSS_WEIGHTS, hold_integrals, safe_divide, sin_cos
+from jaxident.numerics import GAUSS_NODES, GAUSS_WEIGHTS, add_pairs, hold_integrals, safe_divide, sin_cos
 
 DOUBLINGS = 8
 TERMS = 12
@@ -110,15 +110,16 @@ def advance(state: State, pull: Force, solution: Hold) -> State:
     below 1e-9 m for a turn of up to one radian within the step.
     """
     start = (state.v, state.w, pull.along, pull.heading)
-    along_x: Any = 0.0
-    along_y: Any = 0.0
+    along_x, along_y = [], []
     for weight, node_v, node_turn in zip(GAUSS_WEIGHTS, solution.node_v, solution.node_turn, strict=True):
         sine, cosine = sin_cos(state.theta + weigh(node_turn, start))
-        v = weigh(node_v, start)
-        along_x, along_y = along_x + weight * v * cosine, along_y + weight * v * sine
+        v = weight * weigh(node_v, start)
+        along_x.append(v * cosine)
+        along_y.append(v * sine)
+    mean_x, mean_y = add_pairs(along_x, along_y)
     return State(
-        state.x + solution.step * along_x,
-        state.y + solution.step * along_y,
+        state.x + solution.step * mean_x,
+        state.y + solution.step * mean_y,
         state.theta + weigh(solution.turn, start),
         weigh(solution.v, start),
         weigh(solution.w, start),
