@@ -1,8 +1,11 @@
 """The set-up of JAX, each in a process of its own: it counts only before the first computation."""
 
 import os
+import platform
 import subprocess
 import sys
+
+import pytest
 
 PROGRAM = """
 import os, jax, jaxident as ji
@@ -17,6 +20,19 @@ text = jax.jit(lambda a, x: jax.lax.scan(body, (a, a), x)).lower(jnp.ones(8), jn
 print(jnp.ones(1).dtype, any(" = (f64[8]" in line and " fusion(" in line for line in text.splitlines()))
 print(jax.config.jax_compilation_cache_dir)
 print(os.environ["XLA_FLAGS"])
+"""
+
+REPEATED = """
+import resource, jax, jaxident as ji
+ji.start_jax(cache=False)
+import jax.numpy as jnp
+
+three = jax.jit(lambda a: (a + 1.0, a + 2.0, a + 3.0))
+array = jnp.ones((2000, 512))
+for _ in range(4):
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+    jax.block_until_ready(three(array))
+print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
 """
 
 
@@ -44,3 +60,9 @@ def test_flags_of_the_user_are_kept():
     assert kept.startswith("--xla_cpu_enable_fast_math=false --xla_backend_extra_options=")
     own = "--xla_backend_extra_options=xla_cpu_disable_slp_vectorizer"
     assert outcome(JAXIDENT_CACHE="", XLA_FLAGS=own)[2] == own
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="the setting is glibc's")
+def test_memory_of_large_results_is_used_again():
+    run = subprocess.run([sys.executable, "-c", REPEATED], capture_output=True, text=True, check=True, timeout=120)
+    assert int(run.stdout) < 1000  # of the 6000 pages of three results
