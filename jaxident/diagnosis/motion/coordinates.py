@@ -84,6 +84,9 @@ SMOOTH = tuple(
 )  # fmt: skip
 """Effects whose score is a derivative at neutral; the others are looked for from `seeds`."""
 
+SHORTEST = 1e-4
+"""Spin [s] of a wheel below which poses cannot tell it from none, and say nothing about it."""
+
 STEPPED = {("input_quantisation", "step"), ("backlash", "coasting"), ("traction_limit", "dry")}
 """Coordinates that poses follow in jumps, or that choose between two forms: looked for on a grid alone."""
 
@@ -139,7 +142,8 @@ def to_catalogue(name: str, values: Mapping[str, float]) -> dict[str, float]:
         return {"rate": _inverse(values["inverse_rate"])}
     if name == "traction_limit":
         limit = _inverse(np.sqrt(max(values["inverse_square"], 0.0)))
-        return {"limit": limit, "dry": float(values["dry"]), "spin": float(values["spin"])}
+        spin = float(values["spin"]) if values["spin"] > SHORTEST else 0.0
+        return {"limit": limit, "dry": float(values["dry"]), "spin": spin}
     if name == "slope":
         return {
             "acceleration": float(np.hypot(values["x"], values["y"])),
