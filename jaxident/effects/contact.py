@@ -67,8 +67,7 @@ def slope(theta: Array, acceleration: Array, direction: Array) -> Force:
 
 ENTRIES = (
     Entry("traction_limit", "contact",
-          "per wheel c -> L tanh(c / L), c = m - n the net push; dry: c within +-L, beyond it +-L until e = 0 again, "
-          "tau e' = c -+ L - e",
+          "per wheel c = m - n -> L tanh(c / L); dry: c, beyond +-L +-L until e = 0, tau e' = c -+ L - e",
           (Parameter("limit", UNIT, float("inf"), (0.2, 2.0), 0.5, least=0.0, above=True),
            Parameter("dry", "", 0.0, (0.0, 1.0), 0.0, least=0.0, most=1.0, shape=True),
            Parameter("spin", "s", 0.0, (0.0, 0.1), 0.0, least=0.0, shape=True)), BOTH, ("motor_lag",),
