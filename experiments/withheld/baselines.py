@@ -110,7 +110,7 @@ def _regression(case: pathlib.Path) -> Regression:
     """That of a case's real logs after its own identification."""
     paths = sorted(case.glob("real_*"), key=lambda path: int(path.name.split("_")[1].split(".")[0]))
     runs = [ji.read_log(path) for path in paths]
-    return regression(ji.identify(runs, coupling=True).model, runs)
+    return regression(ji.identify(runs, coupling=True, noise_law="white").model, runs)
 
 
 def projected(given: Regression) -> tuple[np.ndarray, dict[str, np.ndarray]]:

@@ -25,7 +25,7 @@ def excess(seed: int) -> dict[str, float]:
     case = describe(seed, [], slip=False, sim=False) | {"noise": None}
     noise = describe(seed, [], slip=False, sim=False)["noise"]
     runs = [make_log(*drive_run(case, run | {"effects": {}}).T) for run in plan(case)]
-    found = ji.identify(runs, coupling=True)
+    found = ji.identify(runs, coupling=True, noise_law="white")
     misfit = [float(np.sqrt(np.nanmean(np.square(column)))) for column in found.residuals]
     position, heading = max(misfit[:2]), misfit[2]
     return {

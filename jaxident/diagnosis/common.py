@@ -9,8 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jaxident.array_types import Array
 from jaxident.diagnosis.causes.candidates import ENOUGH, PENALTY, Candidate, Finding
-from jaxident.diagnosis.causes.search import refit
+from jaxident.diagnosis.causes.search import Solution, refit
 from jaxident.diagnosis.causes.unexplained import unexplained
 from jaxident.diagnosis.causes.which import one_more
 from jaxident.diagnosis.motion.coordinates import COORDINATES, NOMINAL, PLACES, free_places, neutral_vector
@@ -60,15 +61,18 @@ def explain_together(robot: Finding, simulator: Finding) -> Together:
 
 def _pair(robot: Finding, simulator: Finding, price: float) -> tuple[tuple[str, ...], tuple[str, ...], Values]:
     """The best set of the robot and the simulator's beside it, and the values of all of the robot's sets."""
+    theirs = {
+        effects: fit for effects, fit in simulator.candidates.items() if all(shows(name, fit) for name in effects)
+    }
     values: Values = {}
     partner: dict[tuple[str, ...], tuple[str, ...]] = {}
     for effects, candidate in robot.candidates.items():
         pairs = {
             other: candidate.evidence + fit.evidence + shared_worth(effects, other, price)
-            for other, fit in simulator.candidates.items()
+            for other, fit in theirs.items()
         }
         partner[effects] = max(pairs, key=lambda other: pairs[other])
-        fit = simulator.candidates[partner[effects]]
+        fit = theirs[partner[effects]]
         missing = tuple(name for name in effects if name not in fit.effects or apart(name, candidate, fit, price))
         values[effects] = pairs[partner[effects]], missing
     chosen = max(values, key=lambda effects: values[effects][0])
@@ -86,17 +90,32 @@ def shared_worth(own: Collection[str], theirs: Collection[str], price: float) ->
 def apart(name: str, one: Candidate, other: Candidate, price: float) -> bool:
     """Whether one of two fits has hardly any of an effect that the other has: taking one size for both would cost more
     than `price` of -log p, and most of the larger size lies between them."""
-    sizes, parts = [], []
-    for solution in (one.solution, other.solution):
-        own = [
-            k for k, place in enumerate(solution.places) if place in {PLACES[name, c.name] for c in COORDINATES[name]}
-        ]
-        free = [solution.places[k] for k in own]
-        sizes.append(solution.vector[free] - neutral_vector(solution.vector[: len(NOMINAL)])[free])
-        parts.append(solution.covariance[np.ix_(own, own)])
-    weight = np.linalg.pinv(parts[0] + parts[1])
-    between, first, second = (float(step @ weight @ step) for step in (sizes[0] - sizes[1], *sizes))
+    (here, own), (there, theirs) = (_size(name, fit.solution) for fit in (one, other))
+    between, first, second = (_squares(step, own + theirs) for step in (here - there, here, there))
     return 0.5 * between > price and between > MOSTLY**2 * max(first, second)
+
+
+def shows(name: str, fit: Candidate) -> bool:
+    """Whether a fit's logs ask for one of its effects: it is worth the price of its coordinates there. A payload that
+    comes after the last run of a simulator changes nothing, and is none of the simulator's."""
+    size, covariance = _size(name, fit.solution)
+    worth = 0.5 * _squares(size, covariance) if len(size) else fit.gain
+    return worth > PENALTY * max(len(size), 1)
+
+
+def _squares(step: Array, covariance: Array) -> float:
+    """step' covariance^-1 step by way of the correlations: variances of what logs say nothing about are enormous."""
+    deviation = np.sqrt(np.diagonal(covariance))
+    unit = step / deviation
+    return float(unit @ np.linalg.pinv(covariance / deviation / deviation[:, None]) @ unit)
+
+
+def _size(name: str, solution: Solution) -> tuple[np.ndarray, np.ndarray]:
+    """The coordinates of an effect that a fit has searched, from neutral (n,), and their covariance (n, n)."""
+    own = [k for k, place in enumerate(solution.places) if place in {PLACES[name, c.name] for c in COORDINATES[name]}]
+    free = [solution.places[k] for k in own]
+    size = solution.vector[free] - neutral_vector(solution.vector[: len(NOMINAL)])[free]
+    return size, solution.covariance[np.ix_(own, own)]
 
 
 def _largest_term(finding: Finding) -> float:

@@ -1,6 +1,7 @@
 """One diagnosis from start to end: logs in; gap, place, causes, shrink and corrected model out."""
 
 from collections.abc import Sequence
+from math import isfinite
 from typing import NamedTuple
 
 from jaxident.diagnosis import translate
@@ -121,10 +122,15 @@ def compare_parameters(prepared: Prepared, finding: Finding, given, common: tupl
         effect = translate.effect_of(name, best, prepared.largest)
         before = translate.effect_values(name, given, prepared.largest)
         rows += [
-            Parameter(f"{name} {key}", before[key], effect.parameters[key], deviation)
+            Parameter(f"{name} {key}", _finite(before[key]), effect.parameters[key], deviation)
             for key, deviation in (effect.standard_deviation or {}).items()
         ]
     return rows
+
+
+def _finite(value: float) -> float | None:
+    """A limit that never acts has no number."""
+    return value if isfinite(value) else None
 
 
 def decide(prepared: Prepared, judgement: Judgement, parameters: list[Parameter]) -> str:

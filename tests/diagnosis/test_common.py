@@ -10,8 +10,8 @@ from jaxident.diagnosis import common
 from jaxident.diagnosis.causes.candidates import Candidate
 from jaxident.diagnosis.causes.corrector import Term
 from jaxident.diagnosis.causes.search import Solution
-from jaxident.diagnosis.common import apart, explain_together, shared_worth
-from jaxident.diagnosis.motion.coordinates import free_places, neutral_vector
+from jaxident.diagnosis.common import apart, explain_together, shared_worth, shows
+from jaxident.diagnosis.motion.coordinates import PLACES, free_places, neutral_vector
 
 TERM = Term("drive", "v^3 in the acceleration along")
 PRICE = 9.0
@@ -56,6 +56,32 @@ def test_the_same_gap_made_up_differently_is_no_difference(together):
     simulator = search({("mass_offset",): 200.0, ("turn_loss",): 190.0}, ("mass_offset",))
     found = together(robot, simulator)
     assert found.robot.selected == found.simulator.selected
+    assert found.missing == ()
+
+
+def test_an_effect_that_does_nothing_in_the_simulator_s_logs_is_the_robot_s_alone(together):
+    """A payload that comes after the last run of the simulator fits its logs as well as none."""
+    robot, simulator = search({("payload_change",): 400.0}, ("payload_change",)), search({("payload_change",): 0.0}, ())
+    nothing = fit(("payload_change",), 0.1, deviation=1e100)
+    found = together(robot, simulator._replace(candidates=simulator.candidates | {("payload_change",): nothing}))
+    assert found.robot.selected == ("payload_change",)
+    assert found.simulator.selected == ()
+    assert found.missing == ("payload_change",)
+
+
+def test_a_coordinate_that_logs_say_nothing_about_hides_no_other():
+    """The spin of a wheel that does not slide has an enormous variance beside a limit that is well known."""
+    known = fit(("traction_limit",), 0.1)
+    k = known.solution.places.index(PLACES["traction_limit", "spin"])
+    known.solution.covariance[k, k] = 1e212
+    assert shows("traction_limit", known)
+    assert apart("traction_limit", known, fit(("traction_limit",), 0.0), PRICE)
+
+
+def test_steps_of_a_command_that_both_have_are_no_difference(together):
+    """Their size is looked for on a grid: the search has no variance of it."""
+    found = together(*(search({("input_quantisation",): 100.0}, ("input_quantisation",)) for _ in range(2)))
+    assert found.robot.selected == ("input_quantisation",)
     assert found.missing == ()
 
 
