@@ -11,6 +11,7 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.candidates import ENOUGH, PENALTY, Candidate, Finding
+from jaxident.diagnosis.causes.scores import sizes_of
 from jaxident.diagnosis.causes.search import Solution, refit
 from jaxident.diagnosis.causes.unexplained import unexplained
 from jaxident.diagnosis.causes.which import one_more
@@ -90,15 +91,17 @@ def shared_worth(own: Collection[str], theirs: Collection[str], price: float) ->
 def apart(name: str, one: Candidate, other: Candidate, price: float) -> bool:
     """Whether one of two fits has hardly any of an effect that the other has: taking one size for both would cost more
     than `price` of -log p, and most of the larger size lies between them."""
-    (here, own), (there, theirs) = (_size(name, fit.solution) for fit in (one, other))
+    pairs = [(name, c.name) for c in COORDINATES[name]]
+    (here, own), (there, theirs) = (_searched(pairs, fit.solution) for fit in (one, other))
     between, first, second = (_squares(step, own + theirs) for step in (here - there, here, there))
     return 0.5 * between > price and between > MOSTLY**2 * max(first, second)
 
 
 def shows(name: str, fit: Candidate) -> bool:
     """Whether a fit's logs ask for one of its effects: it is worth the price of its coordinates there. A payload that
-    comes after the last run of a simulator changes nothing, and is none of the simulator's."""
-    size, covariance = _size(name, fit.solution)
+    comes after the last run of a simulator changes nothing, and is none of the simulator's. What only shapes an effect
+    does not count: an instant may seem well known where the change is none."""
+    size, covariance = _searched(sizes_of(name), fit.solution)
     worth = 0.5 * _squares(size, covariance) if len(size) else fit.gain
     return worth > PENALTY * max(len(size), 1)
 
@@ -110,9 +113,9 @@ def _squares(step: Array, covariance: Array) -> float:
     return float(unit @ np.linalg.pinv(covariance / deviation / deviation[:, None]) @ unit)
 
 
-def _size(name: str, solution: Solution) -> tuple[np.ndarray, np.ndarray]:
-    """The coordinates of an effect that a fit has searched, from neutral (n,), and their covariance (n, n)."""
-    own = [k for k, place in enumerate(solution.places) if place in {PLACES[name, c.name] for c in COORDINATES[name]}]
+def _searched(pairs: list[tuple[str, str]], solution: Solution) -> tuple[np.ndarray, np.ndarray]:
+    """Those of some coordinates that a fit has searched, from neutral (n,), and their covariance (n, n)."""
+    own = [k for k, place in enumerate(solution.places) if place in {PLACES[pair] for pair in pairs}]
     free = [solution.places[k] for k in own]
     size = solution.vector[free] - neutral_vector(solution.vector[: len(NOMINAL)])[free]
     return size, solution.covariance[np.ix_(own, own)]

@@ -47,11 +47,11 @@ def skid(excess: Array, start: Array, middle: Array, step: Array, limit: Array, 
     return Skid(direction, jnp.where(slides, 1.0, ended * jnp.abs(direction)), jnp.where(slides, after, 0.0))
 
 
-def lost_push(push: Array, taken: Array, limit: Array, dry: Array, sliding: Skid) -> Array:
-    """What the ground takes of a net push less the push: `taken` by a tyre that yields, the limit by a dry one that
-    slides."""
+def lost_push(push: Array, yielded: Array, limit: Array, dry: Array, sliding: Skid) -> Array:
+    """What the ground takes of a net push less the push [unit]: `yielded` under a tyre that yields; under a dry one
+    that slides it takes the limit."""
     level = jnp.where(jnp.isfinite(limit), limit, 0.0)
-    return (1.0 - dry) * (taken - push) + dry * sliding.part * (sliding.direction * level - push)
+    return (1.0 - dry) * yielded + dry * sliding.part * (sliding.direction * level - push)
 
 
 def lateral_slip(v: Array, w: Array, slip: Array) -> Array:

@@ -128,7 +128,7 @@ def _not_taken(law, wheels: Wheels, sliding: list[Skid] | None) -> Wheels:
     """What the ground does not take of each wheel's net push, negative."""
     limit, dry = law["limit"], law["dry"]
     pairs = zip(wheels, sliding or [Skid(0.0, 0.0, 0.0)] * 2, strict=True)
-    return Wheels(*(lost_push(c, traction_limit(c, limit), limit, dry, own) for c, own in pairs))
+    return Wheels(*(lost_push(c, traction_limit(c, limit) - c, limit, dry, own) for c, own in pairs))
 
 
 def _smooth(settings, v: Array, w: Array, theta: Array) -> list[Force]:

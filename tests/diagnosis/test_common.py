@@ -69,6 +69,15 @@ def test_an_effect_that_does_nothing_in_the_simulator_s_logs_is_the_robot_s_alon
     assert found.missing == ("payload_change",)
 
 
+def test_an_instant_that_seems_well_known_is_no_change():
+    """Of two coordinates, loss and instant, the second says nothing where the first is within its error."""
+    faint = fit(("payload_change",), 0.1)
+    k = faint.solution.places.index(PLACES["payload_change", "loss"])
+    assert shows("payload_change", faint)
+    faint.solution.covariance[k, k] = 0.1**2
+    assert not shows("payload_change", faint)
+
+
 def test_a_coordinate_that_logs_say_nothing_about_hides_no_other():
     """The spin of a wheel that does not slide has an enormous variance beside a limit that is well known."""
     known = fit(("traction_limit",), 0.1)

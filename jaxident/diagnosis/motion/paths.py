@@ -178,8 +178,8 @@ def _added(settings, drive: Physical, now, pull, ramp, place: float, lightness: 
     across = drive.coupling[0] * w, drive.coupling[1] * v
     along, heading = _linear(drive, v, w, pull, ramp, place)
     asked, law = to_wheels(drive, along, heading), settings["traction_limit"]
-    taken = [n + _traction_loss(n, law["inverse_square"]) for n in asked]
-    wheels = zip(asked, taken, sliding, strict=True)
+    yielded = [_traction_loss(n, law["inverse_square"]) for n in asked]
+    wheels = zip(asked, yielded, sliding, strict=True)
     lost = _force(drive, [lost_push(n, m, _limit(settings), law["dry"], own) for n, m, own in wheels])
     terms = [
         quadratic_drag(v, w, **settings["quadratic_drag"]),
