@@ -52,6 +52,15 @@ def test_a_window_without_poses_to_start_from_stays_finite():
     assert np.all(np.any(early[1:] != 0.0, axis=(1, 2)))
 
 
+def test_laws_without_their_slip_keep_all_else():
+    drawn = draws(Law(5e-4, 4e-3, (0.03, 0.4), 0.2, (1e-3, 5e-3), 0.3), 0.5)
+    found = drawn.without_slip()
+    np.testing.assert_array_equal(found.deviations, drawn.deviations[[0, 1, 4, 5]])
+    assert found[1:] == (None, 0.3)
+    steady = draws(REMEMBERING, 0.5)
+    assert steady.without_slip() is steady
+
+
 def test_windows_in_common_tell_less():
     """Twelve times the same rows on other arcs, or twelve stretches of their own: sampled more widely, seen by slip."""
     apart, together = (np.std(floor(SLIPPING, stride).replays) for stride in (ROWS, 1))

@@ -70,6 +70,16 @@ def test_low_noise_by_chance_is_no_shrink_above_one_for_sure():
     assert found.interval[0] < 1.0 - 0.2 / 30.0
 
 
+def test_a_floor_that_may_be_lower_moves_the_low_end_alone():
+    """A model that misses by 1.5 beside a floor of 2, of which half may be a regular rest: up to 0.5 of 29 is left."""
+    rng = np.random.default_rng(10)
+    before, after, one = errors(rng, 30.0), errors(rng, 1.5), floor(rng, 2.0)
+    sure = shrink_of(before, after, one, NOTHING)
+    found = shrink_of(before, after, one, NOTHING, least=0.5 * one.replays)
+    assert (found.value, found.interval[1]) == (sure.value, sure.interval[1])
+    assert found.interval[0] < 1.0 - 0.5 / 29.0 < sure.interval[0]
+
+
 def test_a_floor_that_is_hardly_known_leaves_the_shrink_open():
     """Before 1.5, after 1.4, floor 1 give or take a third: nobody knows whether much or little of a gap is left."""
     rng = np.random.default_rng(9)

@@ -23,13 +23,17 @@ def made():
 
 def sized(law, made, seed):
     """The law found from residuals drawn under another, start states left where a fit would leave them anywhere."""
-    windows, responses, starts = made
     rng = np.random.default_rng(seed)
-    factor = np.linalg.cholesky(covariance(law, windows, responses))
-    noise = (factor @ rng.normal(size=(COUNT, 3 * ROWS, 1)))[..., 0]
-    residual = noise + (starts @ (0.01 * rng.normal(size=(COUNT, 5, 1))))[..., 0]
+    noise = rng.normal(size=(COUNT, 3 * ROWS, 1))
+    return sized_on(law, made, noise, (made[2] @ (0.01 * rng.normal(size=(COUNT, 5, 1))))[..., 0])
+
+
+def sized_on(law, made, unit, rest):
+    """The law found from draws of unit size under another law, and a rest (windows, numbers)."""
+    windows, responses, starts = made
+    noise = (np.linalg.cholesky(covariance(law, windows, responses)) @ unit)[..., 0]
     measured = windows._replace(pose=windows.pose + noise.reshape(COUNT, ROWS, 3).transpose(1, 0, 2))
-    return size_noise(residual, starts, measured, responses, np.ones(COUNT, bool))
+    return size_noise(noise + rest, starts, measured, responses, np.ones(COUNT, bool))
 
 
 def test_whitener_whitens(made):
@@ -78,6 +82,18 @@ def test_camera_memory_is_not_taken_for_slip(made):
     found = sized(law, made, 4)
     assert found.coloured is not None
     np.testing.assert_allclose(found.coloured, law.coloured, rtol=0.4)
+
+
+def test_a_rest_of_strong_slip_is_no_camera_memory(made):
+    """Short slides sideways, of which slip knows nothing, beside slip that explains a hundred times as much."""
+    responses, rng = made[1], np.random.default_rng(4)
+    noise = rng.normal(size=(COUNT, 3 * ROWS, 1))
+    slides = np.zeros((COUNT, ROWS, 1))
+    for own in slides:
+        own[rng.integers(0, ROWS - 6) :][:6] = 0.003 * rng.choice([-1, 1])
+    found = sized_on(Law(5e-4, 4e-3, (0.2, 2.0), 0.05), made, noise, (responses.left @ slides)[..., 0])
+    assert found.slip is not None
+    assert found.coloured is None
 
 
 def test_doubt_is_the_spread_of_the_sizes(made):

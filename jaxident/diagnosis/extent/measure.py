@@ -60,10 +60,15 @@ def measure(prepared: Prepared, finding: Finding, given, common, seed: int = 0) 
     ends = ends_of(best.vector, residual, windows, inverse)
     own_inverse = early_inverse(law, finding.data.windows, fitted, BURN)
     replay = floor_of(residual, windows, law, draws, responses, ends, seed)
+    least = None
+    if finding.terms and law.slip is not None:
+        # terms left over are regular: so may be what the law calls slip, and then it is still to explain
+        steady = law._replace(slip=None, slip_time=None), draws.without_slip()
+        least = floor_of(residual, windows, *steady, responses, ends, seed).replays
 
     def shrink(squares, solution: Solution) -> Shrink:
         wander = wander_of(solution, finding.data.windows, law, own_inverse, seed)
-        return shrink_of(found[1], squares, replay, wander, seed)
+        return shrink_of(found[1], squares, replay, wander, seed, least)
 
     shrinks = {name: shrink(found[3 + k], c.solution) for k, (name, c) in enumerate(singles.items())}
     weakest = min(singles.values(), key=lambda c: c.gain, default=None)

@@ -27,6 +27,12 @@ class Draws(NamedTuple):
     slip_time: Array | None
     coloured_time: float | None
 
+    def without_slip(self) -> "Draws":
+        """The same laws, their slip left out."""
+        if self.slip_time is None:
+            return self
+        return Draws(np.delete(self.deviations, [2, 3], axis=0), None, self.coloured_time)
+
 
 def sizes_by_memory(law: Law, given: Sample) -> list[Sized]:
     """The law sized again for each memory of slip; itself alone without slip."""

@@ -25,6 +25,9 @@ HOPE = 5.0
 WORTH, MEMORY_WORTH = 6.0, 20.0
 """Gain of log-likelihood for which slip is believed, two variances and a correlation time; and a memory of the camera,
 which is claimed as an effect: what a model's form leaves looks like a small one."""
+REST = 0.01
+"""Part of what slip explains that a memory of the camera must bring beside it, on top: where a robot's own form of an
+effect is taken for slip, what slip is no word for, such as slides sideways, looks like a memory."""
 
 
 class Sample(NamedTuple):
@@ -56,8 +59,9 @@ def size_noise(
     base = size_one(given, begin, None, None)
     slips = [size_one(given, begin, time, None, rival=base.log_likelihood) for time in SLIP_TIMES]
     slip = max(slips, key=lambda s: s.log_likelihood)
-    base = slip if slip.log_likelihood > base.log_likelihood + worth else base
-    needed = base.log_likelihood + MEMORY_WORTH
+    by_slip = slip.log_likelihood - base.log_likelihood
+    base, by_slip = (slip, by_slip) if by_slip > worth else (base, 0.0)
+    needed = base.log_likelihood + MEMORY_WORTH + REST * by_slip
     memories = [size_one(given, begin, None, time, rival=needed) for time in CAMERA_TIMES]
     memory = max(memories, key=lambda s: s.log_likelihood)
     rival = max(needed, memory.log_likelihood + WORTH)
