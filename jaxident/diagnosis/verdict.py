@@ -12,8 +12,9 @@ from jaxident.diagnosis.extent.shrink import interval
 from jaxident.diagnosis.simulator import Simulator
 from jaxident.effects.catalogue import CATALOGUE, SITES
 
-TEMPERATURE = 2.0
-"""Differences of evidence count for half: the noise law and the forms of the effects are never quite right."""
+TEMPERATURE, INEXACT = 2.0, 0.002
+"""Differences of evidence count for half, as the noise law is never quite right; and for less the more there is to
+explain, of which a part is added, as the forms of the effects are not: 1 % of all that is explained is no proof."""
 SIGNIFICANT = 20.0
 """Fall of -log p that the corrector must bring beyond the best set, besides its share, for a gap to be unknown."""
 SHARPNESS = 0.04, 4.0
@@ -29,8 +30,9 @@ SLOW = 0.2
 """Correlation time [s] at which slip is compared."""
 WIDTH = 0.12
 """Of both thresholds, as a logarithm."""
-ALIKE = 6.0
-"""Effects whose evidence in place of another falls short of its by less than this cannot be told from it."""
+ALIKE = 3.0
+"""Effects whose evidence in place of another falls short of its by less than so many temperatures cannot be told from
+it: they are more than a twentieth as likely."""
 NOWHERE = {"actuation": 0.2, "drive": 0.4, "contact": 0.4, "time": 0.0, "camera": 0.0}
 """Sites of a gap that no term of the corrector places."""
 
@@ -72,7 +74,7 @@ def judge(
             for effects, c in finding.candidates.items()
         }
     sure = {name for name, evidence in extra.items() if evidence > ENOUGH} - set(known_there)
-    weights = {effects: value / TEMPERATURE for effects, (value, _) in values.items()}
+    weights = {effects: value / temperature(finding) for effects, (value, _) in values.items()}
     top = max(weights.values())
     total = sum(np.exp(value - top) for value in weights.values())
     unknown = unknown_probability(finding, gap, simulator)
@@ -87,6 +89,11 @@ def judge(
     ordered = [(key, p + spare if k == 0 else p) for k, (key, p) in enumerate(ordered)]
     none = none if ordered else 1.0 - unknown
     return Judgement(none, unknown, ordered, _causes(finding, ordered), _sites(finding, ordered, unknown))
+
+
+def temperature(finding: Finding) -> float:
+    """The difference of evidence that makes one set e times as likely as another."""
+    return TEMPERATURE + INEXACT * max(finding.candidates[finding.selected].gain, 0.0)
 
 
 def unknown_probability(finding: Finding, gap: Gap, simulator: Simulator | None = None) -> float:
@@ -159,7 +166,7 @@ def alike(finding: Finding, name: str) -> tuple[str, ...]:
     if name not in finding.selected:
         return ()
     rest = set(finding.selected) - {name}
-    least = max(finding.candidates[finding.selected].evidence - ALIKE, ENOUGH)
+    least = max(finding.candidates[finding.selected].evidence - ALIKE * temperature(finding), ENOUGH)
     rivals = [
         e for e, c in finding.candidates.items() if len(e) == len(rest) + 1 and rest < set(e) and c.evidence > least
     ]

@@ -50,6 +50,20 @@ def test_effects_nearly_as_good_are_named_together():
     )
 
 
+def test_half_a_per_cent_of_all_that_is_explained_is_no_proof():
+    """A robot's own friction is neither form of the catalogue: what decides between them may be only that."""
+    pair = ("coulomb_friction",), ("stiction",)
+
+    def of(gain, apart):
+        found = finding(dict(zip(pair, (gain, gain + apart), strict=True)), ("stiction",))
+        return alike(found, "stiction"), judge(found, GAP, NONE).causes[0].probability
+
+    assert of(5000.0, 25.0) == (("coulomb_friction",), pytest.approx(0.8, abs=0.15))
+    others, probability = of(5000.0, 250.0)
+    assert others == ()
+    assert probability > 0.99
+
+
 def test_a_further_effect_must_bring_a_part_of_all_that_is_explained():
     def evidence(gain):
         return Candidate(("gain_drift", "dead_zone_drift"), None, gain).evidence
