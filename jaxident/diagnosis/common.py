@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.candidates import ENOUGH, PENALTY, Candidate, Finding
+from jaxident.diagnosis.causes.candidates import ENOUGH, PENALTY, TERMS, Candidate, Finding, largest
 from jaxident.diagnosis.causes.scores import sizes_of
 from jaxident.diagnosis.causes.search import Solution, refit
 from jaxident.diagnosis.causes.unexplained import unexplained
@@ -20,8 +20,6 @@ from jaxident.diagnosis.motion.responses import respond
 
 BEST = 4
 """Sets of either search that are tried on the other's logs as well."""
-TERMS = 2.0
-"""Terms that no effect explains, the largest in both, that one effect may take up: a difference is worth more."""
 MOSTLY = 0.7
 """Part of an effect's size beyond which a difference of sizes is told as the effect, below as a parameter."""
 
@@ -51,7 +49,7 @@ def explain_together(robot: Finding, simulator: Finding) -> Together:
     that no effect explains bring in both: as much is made up easily where something is missing that both have. Effects
     of both take no room: each side is searched once more for another beside them.
     """
-    price = max(ENOUGH, TERMS * min(_largest_term(robot), _largest_term(simulator)))
+    price = max(ENOUGH, TERMS * min(largest(robot.terms), largest(simulator.terms)))
     theirs, own = _best(simulator), _best(robot)
     robot, simulator = _with_sets(robot, theirs, simulator), _with_sets(simulator, own, robot)
     chosen, partner, _ = _pair(robot, simulator, price)
@@ -119,10 +117,6 @@ def _searched(pairs: list[tuple[str, str]], solution: Solution) -> tuple[np.ndar
     free = [solution.places[k] for k in own]
     size = solution.vector[free] - neutral_vector(solution.vector[: len(NOMINAL)])[free]
     return size, solution.covariance[np.ix_(own, own)]
-
-
-def _largest_term(finding: Finding) -> float:
-    return max((gain for _, gain in finding.terms), default=0.0)
 
 
 def _best(finding: Finding) -> list[tuple[str, ...]]:

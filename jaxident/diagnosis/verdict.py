@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxident.diagnosis.causes.candidates import ENOUGH, Finding
+from jaxident.diagnosis.causes.candidates import ENOUGH, Finding, value
 from jaxident.diagnosis.causes.unexplained import UNEXPLAINED
 from jaxident.diagnosis.common import Values
 from jaxident.diagnosis.extent.measure import Gap
@@ -70,19 +70,19 @@ def judge(
     known_there = () if simulator is None else simulator.effects
     if values is None:
         values = {
-            effects: (c.evidence - ENOUGH * len(effects), tuple(name for name in effects if name not in known_there))
+            effects: (value(c, finding.further), tuple(name for name in effects if name not in known_there))
             for effects, c in finding.candidates.items()
         }
     sure = {name for name, evidence in extra.items() if evidence > ENOUGH} - set(known_there)
-    weights = {effects: value / temperature(finding) for effects, (value, _) in values.items()}
+    weights = {effects: worth / temperature(finding) for effects, (worth, _) in values.items()}
     top = max(weights.values())
-    total = sum(np.exp(value - top) for value in weights.values())
+    total = sum(np.exp(weight - top) for weight in weights.values())
     unknown = unknown_probability(finding, gap, simulator)
     known = 1.0 - unknown
     sets: dict[tuple[str, ...], float] = {}
-    for effects, value in weights.items():
+    for effects, weight in weights.items():
         key = tuple(sorted({*values[effects][1], *sure}))
-        sets[key] = sets.get(key, 0.0) + known * float(np.exp(value - top) / total)
+        sets[key] = sets.get(key, 0.0) + known * float(np.exp(weight - top) / total)
     none = sets.pop((), 0.0)
     ordered = sorted(((key, p) for key, p in sets.items() if p > 1e-4), key=lambda pair: -pair[1])
     spare = 1.0 - none - unknown - sum(p for _, p in ordered)

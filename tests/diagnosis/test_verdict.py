@@ -82,6 +82,15 @@ def test_what_the_corrector_explains_beside_a_poor_effect_is_unknown():
     assert unknown_probability(finding({}, (), [(term[0], 10.0)]), GAP) < 0.2
 
 
+def test_what_the_corrector_explains_as_well_makes_a_further_effect_doubtful():
+    """The second brings 125; the largest term left could take up twice 10 or twice 80 of it."""
+    pair, term = ("supply_sag", "transport_delay"), Term("drive", "v^3 in the acceleration along")
+    for left, likely in ((10.0, pair), (80.0, pair[:1])):
+        found = judge(finding({pair[:1]: 5000.0, pair: 5125.0}, likely, [(term, left)]), GAP, NONE)
+        assert found.sets[0][0] == likely
+        assert found.sets[0][1] > 0.8
+
+
 def test_frames_that_lie_are_an_effect_by_themselves():
     found = judge(finding({}, ()), GAP, {"frozen_frames": 300.0})
     assert found.none < 0.01

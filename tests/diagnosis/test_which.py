@@ -7,6 +7,7 @@ import pytest
 
 from jaxident.diagnosis.causes import which
 from jaxident.diagnosis.causes.candidates import ELSEWHERE, FORM, Candidate, form_price
+from jaxident.diagnosis.causes.corrector import Term
 from jaxident.diagnosis.motion.coordinates import SIZE
 from jaxident.diagnosis.noise.law import Law
 
@@ -63,6 +64,19 @@ def test_three_effects_pay_for_each_beyond_the_first():
     assert form_price((FIRST, SECOND, OTHER)) == pytest.approx(FORM + ELSEWHERE)
     assert form_price(("heading_offset", "lens_distortion")) == ELSEWHERE, "one site, but geometry has one form"
     assert form_price(("camera_tilt", "lens_distortion")) == FORM
+
+
+@pytest.mark.parametrize(("left", "selected"), [(40.0, (FIRST, OTHER)), (80.0, (FIRST,))])
+def test_a_further_effect_must_be_worth_two_of_the_terms_that_are_left(monkeypatch, left, selected):
+    """It brings 125 less 4 for its coordinate and 10 for what may be form; the largest term brings 40, or 80."""
+    term = Term("drive", "v^3 in the acceleration along")
+    monkeypatch.setattr(which, "resized", lambda solution, data, responses, law, *rest: law)
+    monkeypatch.setattr(which, "unexplained", lambda *args: ([(term, left), (term, 20.0)], Law(1.0, 1.0)))
+    gains = {(): 0.0, (FIRST,): 10_000.0, (OTHER,): 9_000.0, (FIRST, OTHER): 10_125.0}
+    found = {e: Candidate(e, SimpleNamespace(effects=e), gain) for e, gain in gains.items()}
+    finding = which._defended(which.Search(found, None, None, Law(1.0, 1.0), (FIRST, OTHER)), True)
+    assert finding.selected == selected
+    assert finding.further == 2.0 * left
 
 
 def test_the_rival_is_the_best_set_of_one_effect_more_whatever_its_form_costs():

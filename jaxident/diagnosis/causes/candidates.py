@@ -22,6 +22,11 @@ RIGID = ("marker_offset", "heading_offset")
 pays as at another site, and so do they beside others."""
 
 
+TERMS = 2.0
+"""Terms of the corrector, the largest that no effect explains, that one effect may take up: a further effect, and a
+difference from a simulator, is worth more. Where something is missing that has no name, as much is made up easily."""
+
+
 class Candidate(NamedTuple):
     """A set of effects refitted: its solution and its gain, the fall of -log p from the nominal fit."""
 
@@ -47,6 +52,17 @@ def form_price(effects: Collection[str]) -> float:
     return FORM * (len(sites) - distinct) + ELSEWHERE * max(distinct - 1, 0)
 
 
+def value(candidate: Candidate, further: float = ENOUGH) -> float:
+    """What a set is worth: its evidence less ENOUGH for its first effect and another price for each further one."""
+    count = len(candidate.effects)
+    return candidate.evidence - ENOUGH * min(count, 1) - further * max(count - 1, 0)
+
+
+def largest(terms: list[tuple[Any, float]]) -> float:
+    """What the largest term of the corrector explains."""
+    return max((gain for _, gain in terms), default=0.0)
+
+
 class Finding(NamedTuple):
     """Where the search ended: data under the noise law of the search; the law beside the corrector's terms, and the
     likeliest one without them, which takes what they explain for noise; the nominal fit, all candidates of every stage
@@ -59,6 +75,11 @@ class Finding(NamedTuple):
     candidates: dict[tuple[str, ...], Candidate]
     selected: tuple[str, ...]
     terms: list[tuple[Any, float]]
+
+    @property
+    def further(self) -> float:
+        """What an effect beside others must be worth, all that is left considered."""
+        return max(ENOUGH, TERMS * largest(self.terms))
 
     @property
     def rest(self) -> float:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.candidates import ENOUGH, PENALTY, Candidate, Finding
+from jaxident.diagnosis.causes.candidates import ENOUGH, PENALTY, Candidate, Finding, value
 from jaxident.diagnosis.causes.scores import INSTANT, STEP, at_best, beginnings, score
 from jaxident.diagnosis.causes.search import Data, Solution, refit
 from jaxident.diagnosis.causes.unexplained import unexplained
@@ -68,11 +68,19 @@ def search_effects(
     now = Search(found, data, responses, again, _choose(found, data, without))
     if sized:
         now = _beside_rival(now, without)
+    return _defended(now, sized)
+
+
+def _defended(now: Search, sized: bool) -> Finding:
+    """What the set leaves, or a smaller one, if further effects are not worth what is left."""
     solution = now.found[now.selected].solution
     # once more even for the same set: the law before came from a fit under the nominal one's noise, which is too large
     likely = resized(solution, now.data, now.responses, now.law, sized, LIKELY)
     terms, beside = unexplained(now.data, solution, now.responses, likely, sized)
-    return Finding(now.data, beside, likely, now.found[()].solution, now.found, now.selected, terms)
+    finding = Finding(now.data, beside, likely, now.found[()].solution, now.found, now.selected, terms)
+    smaller = [effects for effects in now.found if 0 < len(effects) < len(now.selected)]
+    best = max([now.selected, *smaller], key=lambda effects: value(now.found[effects], finding.further))
+    return finding if best == now.selected else _defended(now._replace(selected=best), sized)
 
 
 def _beside_rival(now: Search, without: Collection[str]) -> Search:
@@ -204,7 +212,7 @@ def _exchange(found: dict, data: Data, selected: tuple[str, ...], without: Colle
         names = [n for n in _ranked(scores)[:3] if scores[n] > ENOUGH and {*rest, n} not in known]
         _try(found, data, found[beside].solution, names, beside)
     # a larger set must be worth as much more as when sets grow
-    return max(found.values(), key=lambda c: c.evidence - ENOUGH * len(c.effects)).effects
+    return max(found.values(), key=value).effects
 
 
 def _scores(data: Data, solution: Solution, without: Collection[str]) -> dict[str, float]:
