@@ -46,8 +46,8 @@ def explain_together(robot: Finding, simulator: Finding) -> Together:
     """The pair of sets, one for the robot and one for the simulator, with the highest evidence in all.
 
     An effect of both is paid for once; one of either alone must be worth more than ENOUGH, and more than TERMS terms
-    that no effect explains bring in both: as much is made up easily where something is missing that both have. Effects
-    of both take no room: each side is searched once more for another beside them.
+    that no effect explains bring in both, or beside others in its own logs: as much is made up easily where something
+    is missing. Effects of both take no room: each side is searched once more for another beside them.
     """
     price = max(ENOUGH, TERMS * min(largest(robot.terms), largest(simulator.terms)))
     theirs, own = _best(simulator), _best(robot)
@@ -63,11 +63,12 @@ def _pair(robot: Finding, simulator: Finding, price: float) -> tuple[tuple[str, 
     theirs = {
         effects: fit for effects, fit in simulator.candidates.items() if all(shows(name, fit) for name in effects)
     }
+    further = robot.further, simulator.further
     values: Values = {}
     partner: dict[tuple[str, ...], tuple[str, ...]] = {}
     for effects, candidate in robot.candidates.items():
         pairs = {
-            other: candidate.evidence + fit.evidence + shared_worth(effects, other, price)
+            other: candidate.evidence + fit.evidence + shared_worth(effects, other, price, further)
             for other, fit in theirs.items()
         }
         partner[effects] = max(pairs, key=lambda other: pairs[other])
@@ -78,12 +79,19 @@ def _pair(robot: Finding, simulator: Finding, price: float) -> tuple[tuple[str, 
     return chosen, partner[chosen], values
 
 
-def shared_worth(own: Collection[str], theirs: Collection[str], price: float) -> float:
+def shared_worth(
+    own: Collection[str], theirs: Collection[str], price: float, further: tuple[float, float] = (ENOUGH, ENOUGH)
+) -> float:
     """What is added to the evidence of two sets: coordinates of effects in both are paid for once, every effect costs
-    ENOUGH as in a search alone, and one that only one of them has the price of a difference."""
-    both, either = set(own) & set(theirs), set(own) | set(theirs)
-    saved = PENALTY * sum(len(COORDINATES[name]) for name in both)
-    return saved - ENOUGH * len(both) - price * len(either - both)
+    ENOUGH as in a search alone, and one that only one of them has the price of a difference, or, beside others, that of
+    a further effect of this one, `further`."""
+    both = set(own) & set(theirs)
+    worth = sum(PENALTY * len(COORDINATES[name]) - ENOUGH for name in both)
+    for effects, beside in zip((own, theirs), further, strict=True):
+        alone = len(set(effects) - both)
+        first = min(alone, 0 if both else 1)
+        worth -= price * first + max(price, beside) * (alone - first)
+    return worth
 
 
 def apart(name: str, one: Candidate, other: Candidate, price: float) -> bool:

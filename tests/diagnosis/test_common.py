@@ -108,6 +108,14 @@ def test_an_effect_of_both_is_paid_for_once():
     assert shared_worth(("slope",), ("slope",), PRICE) == 4.0 * 2 - 9.0  # two coordinates, and to be claimed
 
 
+def test_beside_others_an_effect_of_one_alone_pays_for_the_terms_left_in_its_own_logs():
+    own, pair = 50.0, ("slope", "turn_loss")
+    assert shared_worth(pair, (), PRICE, (own, PRICE)) == -PRICE - own
+    assert shared_worth(pair, ("slope",), PRICE, (own, PRICE)) == 4.0 * 2 - 9.0 - own
+    assert shared_worth(("slope",), ("turn_loss",), PRICE, (own, own)) == -2.0 * PRICE
+    assert shared_worth((), pair, PRICE, (own, PRICE)) == -2.0 * PRICE
+
+
 def test_the_same_effect_of_another_size_is_a_parameter_and_hardly_any_of_it_a_difference():
     large, half, little = (fit(("transport_delay",), size) for size in (0.1, 0.06, 0.02))
     assert not apart("transport_delay", large, large, PRICE)
