@@ -9,6 +9,7 @@ from jaxident.diagnosis.causes.candidates import ENOUGH, Finding
 from jaxident.diagnosis.causes.direct import direct_effects, direct_evidence
 from jaxident.diagnosis.causes.which import search_effects
 from jaxident.diagnosis.common import MOSTLY, Values, explain_together
+from jaxident.diagnosis.extent.measure import measure
 from jaxident.diagnosis.noise.law import Law, first_law
 from jaxident.diagnosis.prepare import Prepared, prepare
 from jaxident.diagnosis.repair import search
@@ -29,12 +30,14 @@ UNITS = 15.0
 
 class Simulator(NamedTuple):
     """What the user's simulator is: vector (SIZE,) of its nominal parameters and effects, and their names; the search
-    of its logs, None for a model; what a difference between it and the robot must be worth."""
+    of its logs, None for a model; what a difference between it and the robot must be worth; how far its own gap exceeds
+    its noise, where it has noise (`Gap.excess`)."""
 
     vector: Any
     effects: tuple[str, ...]
     finding: Finding | None = None
     price: float = ENOUGH
+    excess: float = 0.0
 
 
 def check_units(sim: Log | Sequence[Log], logs: Log | Sequence[Log]) -> None:
@@ -69,14 +72,15 @@ def inspect_simulator(
 ) -> tuple[Simulator, Finding, Values]:
     """The simulator behind some logs; the robot's search with the set selected that explains both best together; and
     what `judge` takes for the values of sets."""
-    own, found = _search(sim, prepared, finding)
+    own, found, noisy = _search(sim, prepared, finding)
     together = explain_together(finding, found)
     fit = together.simulator.candidates[together.simulator.selected]
     shared_effects = tuple(name for name in fit.effects if name not in together.missing)
     direct = tuple(name for name, worth in direct_evidence(own, found).items() if worth > ENOUGH)
     rare = rarer(direct_effects(own, found, direct), direct_effects(prepared, finding, direct))
     effects = (*shared_effects, *(name for name in direct if name not in rare))
-    simulator = Simulator(fit.solution.vector, effects, together.simulator, together.price)
+    excess = _excess(own, together.simulator) if noisy else 0.0
+    simulator = Simulator(fit.solution.vector, effects, together.simulator, together.price, excess)
     return simulator, together.robot, together.values
 
 
@@ -86,16 +90,25 @@ def rarer(theirs: dict[str, dict[str, float]], own: dict[str, dict[str, float]])
     return [name for name, share in shares.items() if theirs[name]["probability"] < (1.0 - MOSTLY) * share]
 
 
-def _search(sim: Log | Sequence[Log], prepared: Prepared, finding: Finding) -> tuple[Prepared, Finding]:
+def _search(sim: Log | Sequence[Log], prepared: Prepared, finding: Finding) -> tuple[Prepared, Finding, bool]:
     """The search of a simulator's logs: as far as the robot's camera could tell or, where they are as noisy themselves,
-    under their own noise."""
+    under their own noise; and whether they are."""
     law, nominal = Law(finding.law.position, finding.law.heading), finding.nominal.vector[:10]
     own = prepare(sim, None, nominal, prepared, law)
     noise = first_law(own.windows)
     if noise.position > NOISY * law.position or noise.heading > NOISY * law.heading:
         own = prepare(sim, None, nominal, prepared)
-        return search(own._replace(naming=np.ones(len(own.naming), bool)))
-    return own, search_effects(own.windows, np.ones(len(own.naming), bool), own.nominal, law, sized=False)
+        mended, found = search(own._replace(naming=np.ones(len(own.naming), bool)))
+        return mended._replace(naming=own.naming), found, True
+    return own, search_effects(own.windows, np.ones(len(own.naming), bool), own.nominal, law, sized=False), False
+
+
+def _excess(own: Prepared, found: Finding) -> float:
+    """How far a simulator's own gap exceeds its noise; 0 where its logs are too short to tell."""
+    try:
+        return measure(own, found, None, ())[0].excess
+    except InputError:
+        return 0.0
 
 
 def as_simulator(model: Model, logs: Log | Sequence[Log]) -> Simulator:

@@ -8,10 +8,12 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.search import Solution
 from jaxident.diagnosis.motion.coordinates import (
+    ASIDE,
     COORDINATES,
     NOMINAL,
     PLACES,
     from_catalogue,
+    limits,
     natural,
     neutral_vector,
     nominal_vector,
@@ -77,7 +79,10 @@ def effect_of(name: str, solution: Solution, largest: float) -> Effect:
         slopes.append([(moved[k] * factors[k] - values[k]) / step for k in values])
     slope = np.array(slopes)
     spread = np.sqrt(np.maximum(np.einsum("ap,ab,bp->p", slope, own, slope), 0.0))
-    return Effect(name, values, dict(zip(values, spread.tolist(), strict=True)))
+    deviations = dict(zip(values, spread.tolist(), strict=True))
+    if name == ASIDE[0] and PLACES[ASIDE] not in solution.places:
+        deviations[ASIDE[1]] = limits()[1][PLACES[ASIDE]] / 3.0**0.5  # it lies anywhere within its bounds
+    return Effect(name, values, deviations)
 
 
 def effect_values(name: str, vector: Array, largest: float) -> dict[str, float]:

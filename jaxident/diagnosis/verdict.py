@@ -8,7 +8,6 @@ from jaxident.diagnosis.causes.candidates import ENOUGH, Finding, value
 from jaxident.diagnosis.causes.unexplained import UNEXPLAINED
 from jaxident.diagnosis.common import Values
 from jaxident.diagnosis.extent.measure import Gap
-from jaxident.diagnosis.extent.shrink import interval
 from jaxident.diagnosis.simulator import Simulator
 from jaxident.effects.catalogue import CATALOGUE, SITES
 
@@ -25,7 +24,8 @@ is this many times what noise could make it at most."""
 BELIEVABLE = 0.025
 """Random slip beyond this part of full drive, at a correlation time of SLOW [s], is a cause nobody has found yet."""
 MORE = 2.0
-"""Times a simulator's slip that a robot's may be: two halves of one log of a real robot differ by up to 1.7."""
+"""Times a simulator's slip, and excess, that a robot's may be: slip of two halves of one log of a real robot differs by
+up to 1.7."""
 SLOW = 0.2
 """Correlation time [s] at which slip is compared."""
 WIDTH = 0.12
@@ -103,8 +103,9 @@ def unknown_probability(finding: Finding, gap: Gap, simulator: Simulator | None 
     rest = rest_of(finding, simulator)
     large = _logistic((rest - SIGNIFICANT) / SHARPNESS[1])
     explained = large * _logistic((finding.share(rest) - UNEXPLAINED) / SHARPNESS[0])
-    beyond = _beyond(excess_of(gap), EXCESS), _beyond(slip_of_drive(finding), believable_slip(simulator))
-    return 1.0 - (1.0 - explained) * (1.0 - beyond[0]) * (1.0 - beyond[1])
+    missed = _beyond(gap.excess, believable_excess(simulator))
+    slipping = _beyond(slip_of_drive(finding), believable_slip(simulator))
+    return 1.0 - (1.0 - explained) * (1.0 - missed) * (1.0 - slipping)
 
 
 def rest_of(finding: Finding, simulator: Simulator | None = None) -> float:
@@ -124,11 +125,10 @@ def believable_slip(simulator: Simulator | None = None) -> float:
     return max(BELIEVABLE, MORE * slip_of_drive(simulator.finding))
 
 
-def excess_of(gap: Gap) -> float:
-    """The corrected model's error on runs that served nothing else, at the low end of its interval, over the high end
-    of what noise makes."""
-    errors = np.asarray(gap.errors[2])
-    return interval(errors)[0] / max(gap.floor_interval[1], 1e-9) if np.isfinite(errors).all(axis=1).any() else 0.0
+def believable_excess(simulator: Simulator | None = None) -> float:
+    """Excess on runs that served nothing else that no unknown cause is needed for: EXCESS, or MORE times what a
+    simulator has on its own logs."""
+    return EXCESS if simulator is None else max(EXCESS, MORE * simulator.excess)
 
 
 def slip_of_drive(finding: Finding) -> float:

@@ -9,7 +9,7 @@ from jaxident.diagnosis.causes.candidates import ENOUGH, PENALTY, Candidate, val
 from jaxident.diagnosis.diagnose import Diagnosis
 from jaxident.diagnosis.motion.coordinates import COORDINATES
 from jaxident.diagnosis.replay import DRAWS, FAINT, Replay
-from jaxident.diagnosis.verdict import EXCESS, believable_slip, excess_of, rest_of, slip_of_drive
+from jaxident.diagnosis.verdict import believable_excess, believable_slip, rest_of, slip_of_drive
 from jaxident.diagnosis.visible import smallest_sizes
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.report.page import Figure, Section, Table
@@ -126,9 +126,9 @@ NO_TERMS = "A library of simple forces and camera errors explains nothing more."
 
 def _beyond_words(found: Diagnosis) -> list[str]:
     """What speaks for something unknown without saying where."""
-    excess, slip = excess_of(found.gap), slip_of_drive(found.finding)
+    excess, slip = found.gap.excess, slip_of_drive(found.finding)
     words = []
-    if excess > EXCESS:
+    if excess > believable_excess(found.simulator):
         words.append(f"Stretches that took no part in any fit are predicted {number(excess)} times worse than noise "
                      "allows, at the least.")  # fmt: skip
     if slip > believable_slip(found.simulator):

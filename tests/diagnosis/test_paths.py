@@ -4,11 +4,14 @@ import jax
 import numpy as np
 import pytest
 
+from jaxident.array_types import State
 from jaxident.diagnosis.motion.coordinates import (
     COORDINATES,
+    ON_SPEEDS,
     PLACES,
     SIZE,
     by_effect,
+    free_places,
     from_catalogue,
     neutral_vector,
     nominal_vector,
@@ -114,3 +117,28 @@ def test_effects_that_share_pushes_leave_them_as_they_are(log, name):
     pushed = jax.jit(push_of)
     same = jax.tree.map(np.array_equal, pushed(nominal(), windows), pushed(vector, windows))
     assert all(same) == (name not in PUSHING)
+
+
+def beside(drive: Physical, left: float) -> Physical:
+    """The drive as seen from a point to the left of the axle's middle: v - b w in place of v."""
+    (r1, r2), (c1, c2) = drive.rate, drive.coupling
+    seen = np.array([[1.0, -left], [0.0, 1.0]])
+    decay = seen @ np.array([[r1, -c1], [-c2, r2]]) @ np.linalg.inv(seen)
+    return Physical(np.diagonal(decay), seen @ drive.gain, -np.array([decay[0, 1], decay[1, 0]]))
+
+
+@pytest.mark.parametrize(("name", "form"), CASES)
+def test_how_far_left_a_marker_is_nothing_tells_but_effects_on_speeds(log, name, form):
+    """A robot whose marker lies to the left, and another one whose marker does not, from the same reported pose."""
+    typical = CATALOGUE[name].typical() | ({"instant": 2.0} if name == "payload_change" else {}) | form
+    others = () if name == "marker_offset" else (Effect(name, typical),)
+    left = 0.05
+
+    def poses(drive, y, aside):
+        effects = (*others, Effect("marker_offset", {"ahead": 0.03, "left": aside}))
+        start = State(0.0, y, 0.0, 0.0, 0.0)
+        return np.stack(simulate(Model(STEP, drive, DEAD_ZONE, effects=effects), log, start=start).pose)
+
+    apart = np.abs(poses(DRIVE, 0.0, left) - poses(beside(DRIVE, left), left, 0.0)).max()
+    assert (apart > 1e-4) == (name in ON_SPEEDS or form == {"coasting": 1.0})
+    assert (PLACES["marker_offset", "left"] in free_places(("marker_offset", name))) == (name in ON_SPEEDS)

@@ -23,3 +23,11 @@ def test_a_spin_that_poses_cannot_tell_from_none_is_none(spin, told):
     assert found.standard_deviation == pytest.approx(
         {"limit": 2.0 * 0.5 * 0.5**3 * 1e-3, "dry": 0.0, "spin": 1e-3 if told else 0.0}, rel=1e-4
     )
+
+
+def test_where_nothing_tells_how_far_left_a_marker_is_it_may_lie_anywhere():
+    places = free_places(("marker_offset",))
+    solution = Solution(neutral_vector(np.ones(10)), None, places, None, 0.0, 1e-6 * np.eye(len(places)), 1)
+    found = effect_of("marker_offset", solution, 2.0)
+    assert found.parameters == {"ahead": 0.0, "left": 0.0}
+    assert found.standard_deviation == pytest.approx({"ahead": 1e-3, "left": 0.3 / 3.0**0.5})

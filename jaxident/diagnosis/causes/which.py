@@ -84,10 +84,10 @@ def _defended(now: Search, sized: bool) -> Finding:
 
 
 def _beside_rival(now: Search, without: Collection[str]) -> Search:
-    """The search once more under the noise beside the best set of one effect more, if that is much less: the noise so
-    far had taken the effect up, and left it too little to gain."""
-    rival = _rival(now.found, now.selected)
-    if rival is None:
+    """The search once more under the noise beside the best set of one effect more, or beside a set of several itself,
+    if that is much less: the noise so far had taken the last effect up, and left it too little to gain."""
+    rival = _rival(now.found, now.selected) or now.found[now.selected]
+    if len(rival.effects) < 2:
         return now
     law = resized(rival.solution, now.data, now.responses, now.law, sized=True)
     if not is_quieter(law, now.law, TAKEN):

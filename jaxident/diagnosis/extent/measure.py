@@ -9,7 +9,7 @@ from jaxident.diagnosis.causes.search import Solution
 from jaxident.diagnosis.causes.unexplained import UNEXPLAINED
 from jaxident.diagnosis.extent.floor import REPLAYS, Floor, floor_of, wander_of
 from jaxident.diagnosis.extent.gap import deviations, early_inverse, ends_of, last_errors, settle
-from jaxident.diagnosis.extent.shrink import HIGH, LOW, Shrink, shrink_of
+from jaxident.diagnosis.extent.shrink import HIGH, LOW, Shrink, interval, shrink_of
 from jaxident.diagnosis.extent.where import Place, increments, locate
 from jaxident.diagnosis.motion.coordinates import COORDINATES, NOMINAL, PLACES, neutral_vector
 from jaxident.diagnosis.motion.linear import follow
@@ -41,6 +41,13 @@ class Gap(NamedTuple):
     placebo: tuple[str, Shrink] | None
     errors: Any
     replay: Floor
+
+    @property
+    def excess(self) -> float:
+        """The corrected model's error, at the low end of its interval, over the high end of what noise makes."""
+        errors = np.asarray(self.errors[2])
+        seen = np.isfinite(errors).all(axis=1).any()
+        return interval(errors)[0] / max(self.floor_interval[1], 1e-9) if seen else 0.0
 
 
 def measure(prepared: Prepared, finding: Finding, given, common, seed: int = 0) -> tuple[Gap, Place, dict[str, Shrink]]:

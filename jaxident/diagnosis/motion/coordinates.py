@@ -94,7 +94,14 @@ SHAPES = {("stiction", "fade"), ("payload_change", "instant"), ("backlash", "coa
           ("traction_limit", "spin")}  # fmt: skip
 """Coordinates that shape an effect, whatever its size, and do nothing alone."""
 
-SILENT = SHAPES | {("lens_distortion", "pull_x"), ("lens_distortion", "pull_y")}
+ASIDE = ("marker_offset", "left")
+"""Seen from a point beside the middle of its axle a robot is another nominal robot, v - b w its speed along: how far to
+the left a marker is nothing tells, but an effect that acts on the speeds of axle or wheels."""
+
+ON_SPEEDS = {"coulomb_friction", "stiction", "quadratic_drag", "mass_offset", "turn_loss", "lateral_slip"}
+"""Such effects; play that coasts acts on speeds, too, but tells too little."""
+
+SILENT = SHAPES | {("lens_distortion", "pull_x"), ("lens_distortion", "pull_y"), ASIDE}
 """Coordinates that do nothing alone."""
 
 PLACES = {
@@ -132,8 +139,10 @@ def by_effect(vector: Array) -> Mapping[str, dict[str, Any]]:
 
 
 def free_places(effects: tuple[str, ...]) -> list[int]:
-    """Places of the nominal unknowns and of all coordinates of the effects."""
-    return [*range(len(NOMINAL)), *(PLACES[name, c.name] for name in effects for c in COORDINATES[name])]
+    """Places of the nominal unknowns and of all coordinates of the effects, but one that nothing tells (`ASIDE`)."""
+    untold = set() if ON_SPEEDS & set(effects) else {ASIDE}
+    pairs = ((name, c.name) for name in effects for c in COORDINATES[name])
+    return [*range(len(NOMINAL)), *(PLACES[pair] for pair in pairs if pair not in untold)]
 
 
 def to_catalogue(name: str, values: Mapping[str, float]) -> dict[str, float]:
