@@ -4,8 +4,8 @@ Searched apart, two robots with the same unexplained gap make up different effec
 differences.
 """
 
-from collections.abc import Collection
-from typing import NamedTuple
+from collections.abc import Collection, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -61,8 +61,9 @@ def explain_together(robot: Finding, simulator: Finding) -> Together:
 def _pair(robot: Finding, simulator: Finding, price: float) -> tuple[tuple[str, ...], tuple[str, ...], Values]:
     """The best set of the robot and the simulator's beside it, and the values of all of the robot's sets."""
     theirs = {
-        effects: fit for effects, fit in simulator.candidates.items() if all(shows(name, fit) for name in effects)
-    }
+        effects: fit for effects, fit in simulator.candidates.items()
+        if all(shows(name, fit, simulator.candidates) for name in effects)
+    }  # fmt: skip
     further = robot.further, simulator.further
     values: Values = {}
     partner: dict[tuple[str, ...], tuple[str, ...]] = {}
@@ -103,13 +104,15 @@ def apart(name: str, one: Candidate, other: Candidate, price: float) -> bool:
     return 0.5 * between > price and between > MOSTLY**2 * max(first, second)
 
 
-def shows(name: str, fit: Candidate) -> bool:
-    """Whether a fit's logs ask for one of its effects: it is worth the price of its coordinates there. A payload that
-    comes after the last run of a simulator changes nothing, and is none of the simulator's. What only shapes an effect
-    does not count: an instant may seem well known where the change is none."""
+def shows(name: str, fit: Candidate, found: Mapping[Any, Candidate]) -> bool:
+    """Whether a fit's logs ask for one of its effects: it is worth the price of its coordinates there, by its size and
+    by what the fit gains beyond its best part without it among those `found`. A payload that comes after the last run
+    of a simulator changes nothing, and is none of the simulator's; nor is a limit at its largest command. What only
+    shapes an effect does not count: an instant may seem well known where the change is none."""
     size, covariance = _searched(sizes_of(name), fit.solution)
-    worth = 0.5 * _squares(size, covariance) if len(size) else fit.gain
-    return worth > PENALTY * max(len(size), 1)
+    rest = max(c.gain for c in found.values() if set(c.effects) <= set(fit.effects) - {name})
+    worth = 0.5 * _squares(size, covariance) if len(size) else np.inf
+    return min(worth, fit.gain - rest) > PENALTY * max(len(size), 1)
 
 
 def _squares(step: Array, covariance: Array) -> float:

@@ -25,6 +25,9 @@ def fit(effects, size=0.0, deviation=0.01, gain=0.0):
     return Candidate(effects, Solution(vector, None, places, None, 0.0, covariance, 1), gain)
 
 
+NOTHING = {(): fit(())}
+
+
 def search(gains, selected, term=0.0):
     """A search with candidates of some gains, all effects of size 0.1, and a term that it leaves unexplained."""
     candidates = {effects: fit(effects, 0.1, gain=gain) for effects, gain in {(): 0.0, **gains}.items()}
@@ -71,11 +74,18 @@ def test_an_effect_that_does_nothing_in_the_simulator_s_logs_is_the_robot_s_alon
 
 def test_an_instant_that_seems_well_known_is_no_change():
     """Of two coordinates, loss and instant, the second says nothing where the first is within its error."""
-    faint = fit(("payload_change",), 0.1)
+    faint = fit(("payload_change",), 0.1, gain=50.0)
     k = faint.solution.places.index(PLACES["payload_change", "loss"])
-    assert shows("payload_change", faint)
+    assert shows("payload_change", faint, NOTHING)
     faint.solution.covariance[k, k] = 0.1**2
-    assert not shows("payload_change", faint)
+    assert not shows("payload_change", faint, NOTHING)
+
+
+def test_a_limit_at_the_largest_command_is_none():
+    """Its size is far from neutral and well known, but it gains nothing beyond what stands beside it."""
+    both = fit(("slope", "input_saturation"), -900.0, gain=500.0)
+    assert shows("input_saturation", both, NOTHING | {("slope",): fit(("slope",), gain=300.0)})
+    assert not shows("input_saturation", both, NOTHING | {("slope",): fit(("slope",), gain=499.0)})
 
 
 def test_a_coordinate_that_logs_say_nothing_about_hides_no_other():
@@ -83,7 +93,7 @@ def test_a_coordinate_that_logs_say_nothing_about_hides_no_other():
     known = fit(("traction_limit",), 0.1)
     k = known.solution.places.index(PLACES["traction_limit", "spin"])
     known.solution.covariance[k, k] = 1e212
-    assert shows("traction_limit", known)
+    assert shows("traction_limit", known._replace(gain=50.0), NOTHING)
     assert apart("traction_limit", known, fit(("traction_limit",), 0.0), PRICE)
 
 
