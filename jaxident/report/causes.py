@@ -7,7 +7,7 @@ import numpy as np
 from jaxident import plot
 from jaxident.diagnosis.causes.candidates import ENOUGH, PENALTY, Candidate, value
 from jaxident.diagnosis.diagnose import Diagnosis
-from jaxident.diagnosis.motion.coordinates import COORDINATES
+from jaxident.diagnosis.motion.coordinates import ASIDE, COORDINATES, PLACES
 from jaxident.diagnosis.replay import DRAWS, FAINT, Replay
 from jaxident.diagnosis.verdict import believable_excess, believable_slip, rest_of, slip_of_drive
 from jaxident.diagnosis.visible import smallest_sizes
@@ -27,10 +27,9 @@ def causes(found: Diagnosis) -> Section:
         f"has no name for: {chance(judgement.unknown)}."
     )
     table = _cause_table(found)
-    first = [text, table] if table.rows else [text, "No effect of the catalogue is likely to take part."]
-    return Section(
-        "Which effect causes it", [*first, *_look_alikes(found), RANKING, _ranking(found), *_unexplained(found)]
-    )
+    first = table if table.rows else "No effect of the catalogue is likely to take part."
+    words = [*_look_alikes(found), *_untold(found)]
+    return Section("Which effect causes it", [text, first, *words, RANKING, _ranking(found), *_unexplained(found)])
 
 
 RANKING = (
@@ -59,6 +58,20 @@ def _look_alikes(found: Diagnosis) -> list[str]:
         for cause in found.judgement.causes
         if cause.indistinguishable_from
     ]
+
+
+def _untold(found: Diagnosis) -> list[str]:
+    """A word on what no log with these effects can tell."""
+    if ASIDE[0] not in found.selected:
+        return []
+    best = found.finding.candidates[found.finding.selected].solution
+    return [] if PLACES[ASIDE] in best.places else [BESIDE]
+
+
+BESIDE = (
+    "How far left of the axle's middle the marker lies is not told, and taken for 0: seen from a point beside it a "
+    "robot is another nominal robot, whose parameters those of the corrected model are."
+)
 
 
 def _ranking(found: Diagnosis) -> Figure | str:

@@ -1,12 +1,17 @@
 """The page of a diagnosis, of one made up for each verdict."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from support.diagnoses import LARGEST, VERDICTS, made_up
 
+from jaxident.diagnosis.causes.candidates import Candidate
+from jaxident.diagnosis.motion.coordinates import free_places
 from jaxident.diagnosis.visible import smallest_sizes
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.report import Figure, Table, render
+from jaxident.report.causes import BESIDE
 from jaxident.report.diagnosis import diagnosis_page, lead
 from jaxident.report.words import EFFECTS, SITES, chance, measured, number, parameters, percent, together
 
@@ -149,3 +154,14 @@ def test_words():
     ]
     assert plain_spaces(percent(-0.3)) == "−30 %"
     assert together(["motor_lag", "slope", "backlash"], "or") == "motor lag, slope or backlash"
+
+
+@pytest.mark.parametrize(("effects", "told"), [(("marker_offset",), False), (("marker_offset", "turn_loss"), True)])
+def test_a_side_of_the_marker_that_nothing_tells_is_said(effects, told):
+    found = made_up("effects")
+    best = Candidate(effects, SimpleNamespace(places=free_places(effects)), 500.0)
+    finding = found.finding._replace(candidates=found.finding.candidates | {effects: best}, selected=effects)
+    blocks = section(
+        diagnosis_page(found._replace(finding=finding, selected=effects), "runs"), "Which effect causes it"
+    ).blocks
+    assert (BESIDE in blocks) == (not told)
