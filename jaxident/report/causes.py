@@ -34,8 +34,8 @@ def causes(found: Diagnosis) -> Section:
 
 RANKING = (
     "Every effect of the catalogue was scored; the most promising were fitted in full, the nominal parameters along "
-    "with them. The gain is how much better the runs are then explained. It must pay for each number of the effect, for "
-    "chance and, beside others, for what may be only their form, before the effect is claimed: that is the black tick."
+    "with them. The gain is how much better the runs are then explained. It must pay for each number of the effect, "
+    "for chance and, beside others, for what may be their form, before the effect is claimed: that is the black tick."
 )
 
 
