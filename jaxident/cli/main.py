@@ -1,11 +1,14 @@
 """The program: finds the command, and turns every way of ending badly into one line and an exit code."""
 
+import contextlib
 import importlib
 import os
 import sys
 import warnings
 
 import click
+
+from jaxident.cli.output import Lasting
 
 COMMANDS = {
     "reproduce": "The paper's robot, excitation and method, beside its published table.",
@@ -56,8 +59,9 @@ def run() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     warnings.showwarning = lambda message, *_, **__: print(f"warning: {message}", file=sys.stderr)
     try:
-        code = program.main(prog_name="jaxident", standalone_mode=False)
-        sys.stdout.flush()
+        with contextlib.redirect_stdout(Lasting(sys.stdout)):
+            code = program.main(prog_name="jaxident", standalone_mode=False)
+            sys.stdout.flush()
     except BaseException as error:
         code = _explain(error)
     sys.exit(code if isinstance(code, int) else 0)
@@ -69,9 +73,6 @@ def _explain(error: BaseException) -> int:
 
     if isinstance(error, SystemExit | click.exceptions.Exit):
         return int(getattr(error, "exit_code", getattr(error, "code", 0)) or 0)
-    if isinstance(error, BrokenPipeError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
     if os.environ.get("JAXIDENT_TRACEBACK"):
         raise error
     if isinstance(error, KeyboardInterrupt | click.Abort):

@@ -1,6 +1,7 @@
 """The installed program, as a user runs it: exit codes, one line for what is wrong, nothing half-written."""
 
 import json
+import os
 import subprocess
 import sys
 
@@ -202,6 +203,19 @@ def test_simulate_with_effects(tmp_path):
     ):
         refused(jaxident(*words, "--effect", effect, "--out", tmp_path / "bad.csv"), said)
     assert not (tmp_path / "bad.csv").exists()
+
+
+def test_a_reader_who_leaves_early_costs_no_file(tmp_path):
+    """The pipe is closed before the first word; the file is written after the last."""
+    read, write = os.pipe()
+    os.close(read)
+    ended = subprocess.run(
+        [sys.executable, "-m", "jaxident", "effects", "--json", str(tmp_path / "effects.json")],
+        stdout=write, stderr=subprocess.PIPE, text=True, check=False, timeout=300,
+    )  # fmt: skip
+    os.close(write)
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert len(json.loads((tmp_path / "effects.json").read_text())) > 20
 
 
 def test_example_keeps_its_effect_in_the_answer(tmp_path):
