@@ -44,4 +44,6 @@ class Lasting(io.TextIOBase):
             self._go_on()
 
     def _go_on(self) -> None:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, self._stream.fileno())
+        os.close(nowhere)

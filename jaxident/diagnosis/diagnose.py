@@ -10,6 +10,7 @@ from jaxident.diagnosis.causes.direct import direct_effects, direct_evidence
 from jaxident.diagnosis.extent.measure import Gap, measure
 from jaxident.diagnosis.extent.shrink import Shrink
 from jaxident.diagnosis.extent.where import Place
+from jaxident.diagnosis.motion.coordinates import ASIDE, PLACES
 from jaxident.diagnosis.prepare import Prepared, prepare
 from jaxident.diagnosis.repair import search
 from jaxident.diagnosis.replay import Replay, answers, replay, visible
@@ -115,6 +116,8 @@ def compare_parameters(prepared: Prepared, finding: Finding, given, common: tupl
     """Nominal parameters given (coordinates, None where none were) and refitted, in the user's units; then those of the
     effects that the given model has in common with the robot: the right effect may have the wrong size."""
     best = finding.candidates[finding.selected].solution
+    if given is not None and ASIDE[0] in common and PLACES[ASIDE] not in best.places:
+        given = translate.abreast_of_marker(given)  # as the refit has it, which is not told its side
     names, values, deviations = translate.parameters_of(best, prepared.largest)
     told = [None] * len(names) if given is None else translate.in_user_units(given, prepared.largest)
     rows = [Parameter(*row) for row in zip(names, told, values, deviations, strict=True)]

@@ -48,6 +48,19 @@ def to_coordinates(model: Model, logs: Log | Sequence[Log]) -> np.ndarray:
     return vector
 
 
+def abreast_of_marker(vector: Array) -> np.ndarray:
+    """Coordinates (SIZE,) of the same robot seen from the point of its axle abreast of its marker: the speed there,
+    v - b w, in place of v, and no offset of the marker to the left."""
+    left = vector[PLACES[ASIDE]]
+    rates, gain, (c1, c2) = np.exp(vector[:2]), np.reshape(vector[2:6], (2, 2)), vector[8:10]
+    seen, back = np.array([[1.0, -left], [0.0, 1.0]]), np.array([[1.0, left], [0.0, 1.0]])
+    decay = seen @ np.array([[rates[0], -c1], [-c2, rates[1]]]) @ back
+    found = np.array(vector, float)
+    found[:2], found[2:6] = np.log(np.maximum(np.diagonal(decay), 1e-9)), (seen @ gain).ravel()
+    found[8:10], found[PLACES[ASIDE]] = (-decay[0, 1], -decay[1, 0]), 0.0
+    return found
+
+
 def in_user_units(point: Array, largest: float) -> list[float]:
     """Nominal parameters in the order of NOMINAL from coordinates for commands over `largest`."""
     return (natural(point) * float(largest) ** _POWERS).tolist()

@@ -19,6 +19,7 @@ from jaxident.diagnosis.motion.coordinates import (
 from jaxident.diagnosis.motion.inputs import PUSHING
 from jaxident.diagnosis.motion.paths import push_of, report, residuals, track
 from jaxident.diagnosis.motion.windows import cut
+from jaxident.diagnosis.translate import abreast_of_marker
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.simulate import simulate
 from jaxident.log import make_log
@@ -142,3 +143,9 @@ def test_how_far_left_a_marker_is_nothing_tells_but_effects_on_speeds(log, name,
     apart = np.abs(poses(DRIVE, 0.0, left) - poses(beside(DRIVE, left), left, 0.0)).max()
     assert (apart > 1e-4) == (name in ON_SPEEDS or form == {"coasting": 1.0})
     assert (PLACES["marker_offset", "left"] in free_places(("marker_offset", name))) == (name in ON_SPEEDS)
+
+
+def test_a_robot_abreast_of_its_marker_is_the_one_that_is_seen_from_there():
+    vector, wanted = nominal(), neutral_vector(nominal_vector(beside(DRIVE, 0.05), DEAD_ZONE))
+    vector[PLACES["marker_offset", "left"]] = 0.05
+    np.testing.assert_allclose(abreast_of_marker(vector), wanted, atol=1e-12)

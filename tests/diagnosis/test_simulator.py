@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from jaxident.diagnosis.diagnose import compare_parameters
-from jaxident.diagnosis.motion.coordinates import PLACES, neutral_vector
+from jaxident.diagnosis.motion.coordinates import PLACES, free_places, neutral_vector
 from jaxident.diagnosis.simulator import Simulator, as_simulator, check_units, rarer, shared
+from jaxident.diagnosis.translate import abreast_of_marker
 from jaxident.errors import InputError
 from jaxident.log import make_log
 from jaxident.robot.drive import Physical
@@ -97,3 +98,16 @@ def test_what_the_simulator_has_hardly_any_of_is_rarer_there():
     }
     assert rarer(theirs, own) == ["outliers"]
     assert rarer(theirs, {}) == []
+
+
+def test_a_model_that_knows_the_side_of_its_marker_is_compared_as_seen_from_there():
+    """The refit has the same robot with the marker ahead alone: no parameter differs."""
+    given = neutral_vector(np.array([1.0, 1.5, 0.5, 0.4, 5.0, -4.0, 0.1, 0.1, 0.2, -1.0]))
+    given[PLACES["marker_offset", "ahead"]], given[PLACES["marker_offset", "left"]] = 0.02, 0.03
+    places = free_places(("marker_offset",))
+    solution = SimpleNamespace(vector=abreast_of_marker(given), places=places, covariance=1e-4 * np.eye(len(places)))
+    found = {("marker_offset",): SimpleNamespace(solution=solution)}
+    finding = SimpleNamespace(selected=("marker_offset",), candidates=found)
+    rows = compare_parameters(SimpleNamespace(largest=2.0), finding, given, ("marker_offset",))
+    np.testing.assert_allclose([row.nominal for row in rows], [row.refitted for row in rows], atol=1e-12)
+    assert [row.name for row in rows[10:]] == ["marker_offset ahead", "marker_offset left"]
