@@ -9,7 +9,7 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.causes.candidates import ENOUGH, PENALTY, Candidate, Finding, value
 from jaxident.diagnosis.causes.scores import INSTANT, STEP, at_best, beginnings, score
 from jaxident.diagnosis.causes.search import Data, Solution, refit
-from jaxident.diagnosis.causes.unexplained import unexplained
+from jaxident.diagnosis.causes.unexplained import UNEXPLAINED, unexplained
 from jaxident.diagnosis.motion.coordinates import (
     COORDINATES,
     NOMINAL,
@@ -72,12 +72,15 @@ def search_effects(
 
 
 def _defended(now: Search, sized: bool) -> Finding:
-    """What the set leaves, or a smaller one, if further effects are not worth what is left."""
+    """What the set leaves, or a smaller one, if further effects are not worth what is left; a set that leaves so much
+    that the gap is unknown claims none of its names, and stays as near as it is."""
     solution = now.found[now.selected].solution
     # once more even for the same set: the law before came from a fit under the nominal one's noise, which is too large
     likely = resized(solution, now.data, now.responses, now.law, sized, LIKELY)
     terms, beside = unexplained(now.data, solution, now.responses, likely, sized)
     finding = Finding(now.data, beside, likely, now.found[()].solution, now.found, now.selected, terms)
+    if finding.unexplained > UNEXPLAINED:
+        return finding
     smaller = [effects for effects in now.found if 0 < len(effects) < len(now.selected)]
     best = max([now.selected, *smaller], key=lambda effects: value(now.found[effects], finding.further))
     return finding if best == now.selected else _defended(now._replace(selected=best), sized)
