@@ -68,7 +68,7 @@ def test_three_effects_pay_for_each_beyond_the_first():
 
 @pytest.mark.parametrize(("left", "selected"), [(40.0, (FIRST, OTHER)), (80.0, (FIRST,)), (4e3, (FIRST, OTHER))])
 def test_a_further_effect_must_be_worth_two_of_the_terms_that_are_left(monkeypatch, left, selected):
-    """It brings 125 less 4 for its coordinate and 10 for form; the largest term brings 40, 80, or so much that it is unknown."""
+    """It brings 125 less 4 for its coordinate and 10 for form; the largest term brings 40, 80, or all that is left."""
     term = Term("drive", "v^3 in the acceleration along")
     monkeypatch.setattr(which, "resized", lambda solution, data, responses, law, *rest: law)
     monkeypatch.setattr(which, "unexplained", lambda *args: ([(term, left), (term, 20.0)], Law(1.0, 1.0)))
