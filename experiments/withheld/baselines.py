@@ -11,7 +11,9 @@ from scipy import stats
 import jaxident as ji
 from jaxident.effects import CATALOGUE
 from jaxident.errors import InputError, WorkError
+from jaxident.log import Log
 
+from .refits import refit_errors
 from .terms import Regression, regression
 
 COMMONEST = "transport_delay"
@@ -64,53 +66,62 @@ def held_out(given: Regression) -> dict:
         wide = np.column_stack([given.nominal, columns])
         found = np.linalg.lstsq(wide[known], given.target[known], rcond=None)[0]
         errors[name] = float(np.mean((given.target - wide @ found)[~known] ** 2))
+    return smallest(errors)
+
+
+def smallest(errors: dict[str, float]) -> dict:
+    """The effect with the smallest error, if that is less than without any ("")."""
     gains = {name: errors[""] - error for name, error in errors.items() if name}
     best = max(gains, key=gains.__getitem__)
     return diagnosis([best] if gains[best] > 0.0 else [], gains)
 
 
-METHODS: dict[str, Callable[[Regression], dict]] = {
+REGRESSIONS: dict[str, Callable[[Regression], dict]] = {
     "commonest": commonest,
     "correlation": correlation,
     "sparse": sparse,
     "held_out": held_out,
 }
+METHODS = ("refit", *REGRESSIONS)
+
+
+def refits(runs: list[Log]) -> dict[str, dict]:
+    """The effect that a full refit with it predicts held-out runs best with."""
+    return {"refit": smallest(refit_errors(runs))}
+
+
+def regressions(runs: list[Log]) -> dict[str, dict]:
+    """What every method says of the regression of some runs after their own identification."""
+    given = regression(ji.identify(runs, coupling=True, noise_law="white").model, runs)
+    return {name: method(given) for name, method in REGRESSIONS.items()}
 
 
 def run(cases: pathlib.Path, out: pathlib.Path) -> None:
     """OUT/METHOD/case_NNN/diagnosis.json of every method that is not there yet."""
     for case in sorted(folder for folder in cases.iterdir() if folder.is_dir()):
-        missing = [name for name in METHODS if not (out / name / case.name / "process.json").exists()]
-        if not missing:
-            continue
-        begin = time.monotonic()
-        try:
-            found = _say(case, missing)
-            code = 0
-        except (InputError, WorkError) as error:
-            print(f"{case.name}: {error}", flush=True)
-            found, code = {}, 1
-        seconds = round(time.monotonic() - begin, 2)
-        for name in missing:
-            folder = out / name / case.name
-            folder.mkdir(parents=True, exist_ok=True)
-            (folder / "process.json").write_text(json.dumps({"seconds": seconds, "exit_code": code}) + "\n")
-            if name in found:
-                (folder / "diagnosis.json").write_text(json.dumps(found[name], indent=1) + "\n")
-        print(f"{case.name}: baselines in {seconds:.1f} s", flush=True)
+        for names, way in (METHODS[:1], refits), (METHODS[1:], regressions):
+            if all((out / name / case.name / "process.json").exists() for name in names):
+                continue
+            begin, code = time.monotonic(), 0
+            try:
+                found = way(_runs(case))
+            except (InputError, WorkError) as error:
+                print(f"{case.name}: {error}", flush=True)
+                found, code = {}, 1
+            seconds = round(time.monotonic() - begin, 2)
+            for name in names:
+                folder = out / name / case.name
+                folder.mkdir(parents=True, exist_ok=True)
+                if name in found:
+                    (folder / "diagnosis.json").write_text(json.dumps(found[name], indent=1) + "\n")
+                (folder / "process.json").write_text(json.dumps({"seconds": seconds, "exit_code": code}) + "\n")
+            print(f"{case.name}: {', '.join(names)} in {seconds:.1f} s", flush=True)
 
 
-def _say(case: pathlib.Path, names: list[str]) -> dict[str, dict]:
-    """What each method says of a case."""
-    given = _regression(case)
-    return {name: METHODS[name](given) for name in names}
-
-
-def _regression(case: pathlib.Path) -> Regression:
-    """That of a case's real logs after its own identification."""
+def _runs(case: pathlib.Path) -> list[Log]:
+    """A case's real logs."""
     paths = sorted(case.glob("real_*"), key=lambda path: int(path.name.split("_")[1].split(".")[0]))
-    runs = [ji.read_log(path) for path in paths]
-    return regression(ji.identify(runs, coupling=True, noise_law="white").model, runs)
+    return [ji.read_log(path) for path in paths]
 
 
 def projected(given: Regression) -> tuple[np.ndarray, dict[str, np.ndarray]]:

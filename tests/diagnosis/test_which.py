@@ -18,7 +18,7 @@ FIRST, SECOND, OTHER = "turn_loss", "supply_sag", "transport_delay"
 def exchange(monkeypatch):
     """The set chosen from sets and their gains; nothing further is tried."""
     monkeypatch.setattr(which, "_scores", lambda data, solution, without: {})
-    monkeypatch.setattr(which, "_try", lambda found, data, begin, names, beside: None)
+    monkeypatch.setattr(which, "refit_each", lambda found, data, begin, names, beside: None)
 
     def chosen(gains, selected):
         found = {effects: Candidate(effects, None, gain) for effects, gain in {(): 0.0, **gains}.items()}

@@ -58,13 +58,13 @@ def search_effects(
     nominal = refit(data, nominal.vector, nominal.starts, ())
     scores = _scores(data, nominal, without)
     found: dict[tuple[str, ...], Candidate] = {(): Candidate((), nominal, 0.0)}
-    _try(found, data, nominal, _with_look_alikes(scores), ())
+    refit_each(found, data, nominal, _with_look_alikes(scores), ())
     best = max(found.values(), key=lambda c: c.evidence)
     again = resized(best.solution, data, responses, law, sized)
     data, responses = whiten(best.solution, windows, use, again)
     found = _again(found, data)
     scores = _scores(data, found[()].solution, without)
-    _try(found, data, found[()].solution, [n for n in _with_look_alikes(scores) if (n,) not in found], ())
+    refit_each(found, data, found[()].solution, [n for n in _with_look_alikes(scores) if (n,) not in found], ())
     now = Search(found, data, responses, again, _choose(found, data, without))
     if sized:
         now = _beside_rival(now, without)
@@ -132,7 +132,7 @@ def _again(found: dict, data: Data, also: Collection[tuple[str, ...]] = ()) -> d
     return fresh
 
 
-def _try(found: dict, data: Data, begin: Solution, names: list[str], beside: tuple[str, ...]) -> None:
+def refit_each(found: dict, data: Data, begin: Solution, names: list[str], beside: tuple[str, ...]) -> None:
     """Refit every named effect beside others from a solution, and keep what comes out."""
     cost = found[()].solution.cost
     for name in names:
@@ -185,7 +185,7 @@ def _one_more(found: dict, data: Data, selected: tuple[str, ...], without: Colle
     solution = found[selected].solution
     scores = _scores(data, solution, without)
     names = [n for n in _ranked(scores) if n not in selected and scores[n] > ENOUGH][:BESIDE]
-    _try(found, data, solution, names, selected)
+    refit_each(found, data, solution, names, selected)
 
 
 def one_more(finding: Finding, selected: tuple[str, ...]) -> Finding:
@@ -213,7 +213,7 @@ def _exchange(found: dict, data: Data, selected: tuple[str, ...], without: Colle
         scores = _scores(data, found[beside].solution, (*without, *selected))
         known = [set(effects) for effects in found]
         names = [n for n in _ranked(scores)[:3] if scores[n] > ENOUGH and {*rest, n} not in known]
-        _try(found, data, found[beside].solution, names, beside)
+        refit_each(found, data, found[beside].solution, names, beside)
     # a larger set must be worth as much more as when sets grow
     return max(found.values(), key=value).effects
 
