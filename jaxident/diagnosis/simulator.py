@@ -10,7 +10,7 @@ from jaxident.diagnosis.causes.direct import direct_effects, direct_evidence
 from jaxident.diagnosis.causes.which import search_effects
 from jaxident.diagnosis.common import MOSTLY, Values, explain_together
 from jaxident.diagnosis.extent.measure import measure
-from jaxident.diagnosis.noise.law import Law, first_law
+from jaxident.diagnosis.noise.law import Law, deviations, first_law
 from jaxident.diagnosis.prepare import Prepared, prepare
 from jaxident.diagnosis.repair import search
 from jaxident.diagnosis.translate import to_coordinates
@@ -24,6 +24,9 @@ STRIDE = 10
 NOISY = 0.5
 """Part of the robot's camera error from which on a simulator's logs have noise of their own, as those of another robot
 have, and slip."""
+FAINT = 0.01
+"""Part of a camera's error that white noise is taken for where memory has taken all: even logs without noise have
+digits."""
 UNITS = 15.0
 """Ratio of speeds beyond which no two robots that are meant to be the same differ."""
 
@@ -93,14 +96,19 @@ def rarer(theirs: dict[str, dict[str, float]], own: dict[str, dict[str, float]])
 def _search(sim: Log | Sequence[Log], prepared: Prepared, finding: Finding) -> tuple[Prepared, Finding, bool]:
     """The search of a simulator's logs: as far as the robot's camera could tell or, where they are as noisy themselves,
     under their own noise; and whether they are."""
-    law, nominal = Law(finding.law.position, finding.law.heading), finding.nominal.vector[:10]
+    law, nominal = Law(*deviations(finding.law)[1:]), finding.nominal.vector[:10]
     own = prepare(sim, None, nominal, prepared, law)
-    noise = first_law(own.windows)
-    if noise.position > NOISY * law.position or noise.heading > NOISY * law.heading:
+    if _is_noisy(first_law(own.windows), finding.law):
         own = prepare(sim, None, nominal, prepared)
         mended, found = search(own._replace(naming=np.ones(len(own.naming), bool)))
         return mended._replace(naming=own.naming), found, True
     return own, search_effects(own.windows, np.ones(len(own.naming), bool), own.nominal, law, sized=False), False
+
+
+def _is_noisy(white: Law, robot: Law) -> bool:
+    """Whether white camera noise is like that of a robot under some law."""
+    least = np.maximum([robot.position, robot.heading], FAINT * deviations(robot)[1:])
+    return bool(np.any(np.array([white.position, white.heading]) > NOISY * least))
 
 
 def _excess(own: Prepared, found: Finding) -> float:

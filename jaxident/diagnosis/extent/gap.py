@@ -12,7 +12,7 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.motion.linear import follow
 from jaxident.diagnosis.motion.responses import Responses, answer_to_start, modelled_path
 from jaxident.diagnosis.motion.windows import Windows
-from jaxident.diagnosis.noise.law import Law, covariance
+from jaxident.diagnosis.noise.law import Law, covariance, deviations
 
 STEPS = 3
 """Of the search for a window's start state."""
@@ -99,13 +99,6 @@ def in_channels(error: Array, residual: Array, windows: Windows, law: Law) -> np
     x, y, theta = error[:, 0], error[:, 1], error[:, 2]
     turned = np.stack([cosine * x + sine * y, -sine * x + cosine * y, theta], axis=1)
     return turned / deviations(law)[:, None]
-
-
-def deviations(law: Law) -> np.ndarray:
-    """The camera's deviations (3,), white and coloured together, along, lateral [m] and in heading [rad]."""
-    position, angle = law.coloured or (0.0, 0.0)
-    flat = np.hypot(law.position, position)
-    return np.array([flat, flat, np.hypot(law.heading, angle)])
 
 
 def _scale(normal: Array) -> np.ndarray:

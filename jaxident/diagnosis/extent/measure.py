@@ -8,7 +8,7 @@ from jaxident.diagnosis.causes.candidates import Finding
 from jaxident.diagnosis.causes.search import Solution
 from jaxident.diagnosis.causes.unexplained import UNEXPLAINED
 from jaxident.diagnosis.extent.floor import REPLAYS, Floor, floor_of, wander_of
-from jaxident.diagnosis.extent.gap import deviations, early_inverse, ends_of, last_errors, settle
+from jaxident.diagnosis.extent.gap import early_inverse, ends_of, last_errors, settle
 from jaxident.diagnosis.extent.shrink import HIGH, LOW, Shrink, interval, shrink_of
 from jaxident.diagnosis.extent.where import Place, increments, locate
 from jaxident.diagnosis.motion.coordinates import COORDINATES, NOMINAL, PLACES, neutral_vector
@@ -16,7 +16,7 @@ from jaxident.diagnosis.motion.linear import follow
 from jaxident.diagnosis.motion.responses import Responses, modelled_path, respond
 from jaxident.diagnosis.motion.windows import Windows, cut
 from jaxident.diagnosis.noise.doubt import Draws, draw_laws, sizes_by_memory
-from jaxident.diagnosis.noise.law import Law, white_whitener
+from jaxident.diagnosis.noise.law import Law, deviations, white_whitener
 from jaxident.diagnosis.noise.sizing import Sized, sample
 from jaxident.diagnosis.prepare import BURN, Prepared, first_starts
 from jaxident.errors import InputError

@@ -64,10 +64,18 @@ def whitener_of(law: Law, windows: Windows, responses: Responses) -> np.ndarray:
 
 
 def white_whitener(law: Law, windows: Windows) -> np.ndarray:
-    """The whitener (windows, numbers, numbers) of white camera noise alone; diagonal."""
+    """The whitener (windows, numbers, numbers) of camera errors as large as a law's but without memory; diagonal."""
     seen = numbers_seen(windows)
-    scale = np.tile(1.0 / np.array([law.position, law.position, law.heading]), len(windows.step))
+    scale = np.tile(1.0 / deviations(law), len(windows.step))
     return np.eye(len(scale)) * scale * seen[:, :, None]
+
+
+def deviations(law: Law) -> np.ndarray:
+    """The camera's deviations (3,), white and coloured together, along, lateral [m] and in heading [rad]: where memory
+    takes all, the white part alone would weigh a channel without bound."""
+    position, angle = law.coloured or (0.0, 0.0)
+    flat = np.hypot(law.position, position)
+    return np.array([flat, flat, np.hypot(law.heading, angle)])
 
 
 def variances_of(law: Law) -> np.ndarray:
