@@ -98,14 +98,14 @@ def _search(sim: Log | Sequence[Log], prepared: Prepared, finding: Finding) -> t
     under their own noise; and whether they are."""
     law, nominal = Law(*deviations(finding.law)[1:]), finding.nominal.vector[:10]
     own = prepare(sim, None, nominal, prepared, law)
-    if _is_noisy(first_law(own.windows), finding.law):
+    if is_noisy(first_law(own.windows), finding.law):
         own = prepare(sim, None, nominal, prepared)
         mended, found = search(own._replace(naming=np.ones(len(own.naming), bool)))
         return mended._replace(naming=own.naming), found, True
     return own, search_effects(own.windows, np.ones(len(own.naming), bool), own.nominal, law, sized=False), False
 
 
-def _is_noisy(white: Law, robot: Law) -> bool:
+def is_noisy(white: Law, robot: Law) -> bool:
     """Whether white camera noise is like that of a robot under some law."""
     least = np.maximum([robot.position, robot.heading], FAINT * deviations(robot)[1:])
     return bool(np.any(np.array([white.position, white.heading]) > NOISY * least))

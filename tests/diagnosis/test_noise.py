@@ -6,7 +6,7 @@ from support.arcs import along_arcs
 
 from jaxident.diagnosis.motion.responses import answer_to_start, respond
 from jaxident.diagnosis.noise.doubt import MEMORIES, doubt_of, draw_laws, sizes_by_memory
-from jaxident.diagnosis.noise.law import Law, covariance, first_law, is_quieter, whitener_of
+from jaxident.diagnosis.noise.law import Law, covariance, first_law, is_quieter, white_whitener, whitener_of
 from jaxident.diagnosis.noise.sizing import sample, size_noise, size_one
 
 ROWS, COUNT = 45, 60
@@ -42,6 +42,14 @@ def test_whitener_whitens(made):
     white = whitener_of(law, windows, responses)
     unit = white @ covariance(law, windows, responses) @ white.transpose(0, 2, 1)
     np.testing.assert_allclose(unit, np.broadcast_to(np.eye(3 * ROWS), unit.shape), atol=1e-8)
+
+
+def test_white_errors_are_as_large_as_those_of_a_law_whose_memory_took_all(made):
+    windows, responses, _ = made
+    law = Law(3e-4, 1e-7, coloured=(4e-4, 1e-2), coloured_time=0.5)
+    size = np.sqrt(np.diagonal(covariance(law, windows, responses), axis1=1, axis2=2))
+    scale = np.diagonal(white_whitener(law, windows), axis1=1, axis2=2)
+    np.testing.assert_allclose(scale * size, 1.0, rtol=1e-6)
 
 
 def test_white_noise_stays_white(made):

@@ -7,7 +7,8 @@ import pytest
 
 from jaxident.diagnosis.diagnose import compare_parameters
 from jaxident.diagnosis.motion.coordinates import PLACES, free_places, neutral_vector
-from jaxident.diagnosis.simulator import Simulator, as_simulator, check_units, rarer, shared
+from jaxident.diagnosis.noise.law import Law
+from jaxident.diagnosis.simulator import Simulator, as_simulator, check_units, is_noisy, rarer, shared
 from jaxident.diagnosis.translate import abreast_of_marker
 from jaxident.errors import InputError
 from jaxident.log import make_log
@@ -40,6 +41,13 @@ def test_the_same_units_pass():
 def test_other_units_are_told(units, words):
     with pytest.raises(InputError, match=words):
         check_units(drive(**units), drive())
+
+
+def test_logs_without_noise_are_told_from_noisy_ones_beside_a_camera_whose_memory_took_all():
+    robot, nothing = Law(3e-4, 1e-7, coloured=(4e-4, 1e-2), coloured_time=0.5), Law(1e-7, 1e-7)
+    assert not is_noisy(nothing, robot)
+    assert is_noisy(nothing._replace(heading=1e-3), robot)
+    assert is_noisy(nothing._replace(position=3e-4), robot)
 
 
 def test_a_model_with_effects_is_a_simulator():
