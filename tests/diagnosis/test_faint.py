@@ -9,7 +9,7 @@ from jaxident.diagnosis.causes.lost import find_lost
 from jaxident.diagnosis.causes.rhythm import _travels, rhythms
 from jaxident.diagnosis.causes.scores import INSTANT, at_best, beginnings
 from jaxident.diagnosis.causes.scores import STEP as STEP_OF
-from jaxident.diagnosis.causes.search import Data, refit
+from jaxident.diagnosis.causes.search import Data, best_starts, refit
 from jaxident.diagnosis.causes.steps import likely_steps
 from jaxident.diagnosis.motion.coordinates import (
     COORDINATES,
@@ -64,6 +64,18 @@ def nominal_fit(windows):
 @pytest.fixture(scope="module")
 def plain():
     return nominal_fit(windows_of(VECTOR))
+
+
+def test_a_window_whose_start_would_jump_does_not_stop_the_others(plain):
+    data, nominal = plain
+    asked = np.full_like(nominal.starts, 0.05)
+    asked[:, 0] = 3.0
+    asked[:, 1] *= 4.0
+    found, cost = best_starts(data, nominal.vector, nominal.starts - 0.05, asked)
+    np.testing.assert_allclose(found[:, 0], nominal.starts[:, 0] - 0.05)
+    np.testing.assert_allclose(found[:, 1:], nominal.starts[:, 1:])
+    one = np.arange(len(data.use)) > 0
+    assert best_starts(data._replace(use=one), nominal.vector, nominal.starts, 0.0 * asked)[1] < cost
 
 
 def test_the_step_of_a_quantised_command_is_found_among_many():

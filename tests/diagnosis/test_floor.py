@@ -6,7 +6,7 @@ from support.arcs import along_arcs
 
 from jaxident.diagnosis.extent.floor import REPLAYS, floor_of
 from jaxident.diagnosis.extent.gap import early_inverse, ends_of
-from jaxident.diagnosis.motion.responses import respond
+from jaxident.diagnosis.motion.responses import answer_to_start, respond
 from jaxident.diagnosis.noise.doubt import Draws
 from jaxident.diagnosis.noise.law import Law, variances_of
 
@@ -27,7 +27,7 @@ def draws(law, doubt, times=(0.2,)):
 def floor(law, stride, doubt=0.0, times=(0.2,)):
     windows, nothing = along_arcs(ROWS, COUNT, stride), np.zeros((COUNT, 3 * ROWS))
     responses = respond(np.exp(VECTOR), nothing, windows)
-    ends = ends_of(VECTOR, nothing, windows, early_inverse(law, windows, responses, BURN))
+    ends = ends_of(answer_to_start(np.exp(VECTOR), nothing, windows), early_inverse(law, windows, responses, BURN))
     return floor_of(nothing, windows, law, draws(law, doubt, times), responses, ends)
 
 
@@ -46,7 +46,7 @@ def test_a_window_without_poses_to_start_from_stays_finite():
     windows, nothing, law = along_arcs(ROWS, COUNT), np.zeros((COUNT, 3 * ROWS)), Law(5e-4, 4e-3)
     windows = windows._replace(seen=windows.seen & ((np.arange(ROWS) >= BURN)[:, None] | (np.arange(COUNT) > 0)))
     inverse = early_inverse(law, windows, respond(np.exp(VECTOR), nothing, windows), BURN)
-    early = ends_of(VECTOR, nothing, windows, inverse).early
+    early = ends_of(answer_to_start(np.exp(VECTOR), nothing, windows), inverse).early
     assert np.all(early[0] == 0.0)
     assert np.all(np.isfinite(early))
     assert np.all(np.any(early[1:] != 0.0, axis=(1, 2)))

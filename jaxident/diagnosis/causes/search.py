@@ -16,6 +16,9 @@ ENOUGH = 0.05
 LONGEST = 0.5
 """A step changes a rate by at most this much, as a logarithm."""
 
+PARTS = (1.0, 0.25, 0.0)
+"""Of the step of a window's start state that are tried."""
+
 
 class Data(NamedTuple):
     """Windows, the whitener of their noise (windows, numbers, numbers), and which of them (boolean) a fit uses."""
@@ -55,8 +58,7 @@ def refit(data: Data, vector: Array, starts: Array, effects: tuple[str, ...], ho
         new_vector[places] = np.clip(vector[places] + step, low, high)
         step = new_vector[places] - vector[places]
         moved = solve[:, :, -1] - solve[:, :, :-1] @ step
-        new_starts = starts + moved.T
-        new_cost = half_squares(data, new_vector, new_starts)
+        new_starts, new_cost = best_starts(data, new_vector, starts, moved.T)
         if new_cost < cost:
             gained, damping = cost - new_cost, max(0.2 * damping, 1e-7)
             vector, starts = new_vector, new_starts
@@ -72,10 +74,15 @@ def refit(data: Data, vector: Array, starts: Array, effects: tuple[str, ...], ho
     return Solution(vector, starts, places, linear, cost, _covariance(products), step_number)
 
 
-def half_squares(data: Data, vector: Array, starts: Array) -> float:
-    """-log p up to a constant of the windows used."""
-    residual = follow(vector[None], starts[None], data.windows)[0]
-    return 0.5 * float(np.sum((data.whitener[data.use] @ residual[data.use, :, None]) ** 2))
+def best_starts(data: Data, vector: Array, starts: Array, moved: Array) -> tuple[np.ndarray, float]:
+    """Starts (5, windows) moved in every window by the part of what is asked for (5, windows) that fits best, and half
+    the squares of the windows used: one window that shows little of its start must not stop the others."""
+    lanes = starts + np.array(PARTS)[:, None, None] * moved
+    residual = follow(np.tile(vector, (len(lanes), 1)), lanes, data.windows)
+    squares = 0.5 * np.sum((data.whitener @ residual[..., None])[..., 0] ** 2, axis=2)
+    best = np.argmin(squares, axis=0)
+    chosen = np.take_along_axis(lanes, best[None, None], axis=0)[0]
+    return chosen, float(np.sum(squares.min(axis=0)[data.use]))
 
 
 def _taken(data: Data, linear: Linear) -> float:

@@ -1,7 +1,7 @@
 """What the best effects leave unexplained: terms of the corrector and rhythms of the wheels, beside a law of noise that
 does not take them for slip."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.causes.corrector import Term, library, pursue
 from jaxident.diagnosis.causes.rhythm import rhythms
 from jaxident.diagnosis.causes.search import Data, Solution
-from jaxident.diagnosis.motion.linear import gram, normal
+from jaxident.diagnosis.motion.linear import gram, left_over, normal
 from jaxident.diagnosis.motion.responses import Responses
 from jaxident.diagnosis.noise.law import Law, white_whitener, whitener_of
 from jaxident.diagnosis.noise.sizing import size_noise
@@ -19,23 +19,33 @@ UNEXPLAINED = 0.2
 """A gap is unknown where the corrector explains this share of it beyond the best set."""
 
 
+class Choice(NamedTuple):
+    """Terms with the fall of -log p that each brings; the residuals (windows, numbers) that they and the solution's
+    coordinates would leave; the restricted log-likelihood of the windows used, all of them free."""
+
+    found: list[tuple[Term, float]]
+    left: Any
+    log_likelihood: float
+
+
 def unexplained(
     data: Data, solution: Solution, responses: Responses, law: Law, sized: bool
 ) -> tuple[list[tuple[Term, float]], Law]:
     """Terms that a solution leaves room for, each with the fall of -log p that it brings, and the law beside them.
 
     A law sized beside a gap takes the gap for slip or a memory of the camera. So terms are first chosen as if the
-    noise were white, the law is sized again at what they leave, and only then do they count; not so if not `sized`.
+    noise were white, the law is sized again at what they leave, and the terms that count then do so if they and that
+    law are likelier than those under the law before; not so if not `sized`.
     """
     terms, answers = _terms(data, solution, responses)
-    found, _ = _choose(data, whitener_of(law, data.windows, responses), solution, terms, answers)
+    choice = _choose(data, whitener_of(law, data.windows, responses), solution, terms, answers)
     if sized and law != Law(law.position, law.heading):
-        _, left = _choose(data, white_whitener(law, data.windows), solution, terms, answers)
+        left = _choose(data, white_whitener(law, data.windows), solution, terms, answers).left
         again = size_noise(left, solution.linear.starts, data.windows, responses, data.use)
-        others, _ = _choose(data, whitener_of(again, data.windows, responses), solution, terms, answers)
-        if sum(gain for _, gain in others) > sum(gain for _, gain in found):
-            return others, again
-    return found, law
+        other = _choose(data, whitener_of(again, data.windows, responses), solution, terms, answers)
+        if other.log_likelihood > choice.log_likelihood:
+            return other.found, again
+    return choice.found, law
 
 
 def _terms(data: Data, solution: Solution, responses: Responses) -> tuple[list[Term], np.ndarray]:
@@ -50,8 +60,8 @@ def _terms(data: Data, solution: Solution, responses: Responses) -> tuple[list[T
     return [*corrector.terms, *named], columns
 
 
-def _choose(data: Data, whitener: Array, solution: Solution, terms: list[Term], answers: Array) -> tuple[list, Any]:
-    """The terms that count under a whitener, and the residuals that they and the solution's coordinates would leave."""
+def _choose(data: Data, whitener: Array, solution: Solution, terms: list[Term], answers: Array) -> Choice:
+    """The terms that count under a whitener."""
     linear, used, base = solution.linear, data.use, list(range(len(solution.places)))
     columns = np.concatenate([linear.slopes, answers, linear.residual[..., None]], axis=2)
     products = gram(whitener[used], columns[used], linear.starts[used]).products.sum(axis=0)
@@ -60,4 +70,18 @@ def _choose(data: Data, whitener: Array, solution: Solution, terms: list[Term], 
     free = [*base, *(place for place, _ in found)]
     own, cross, scale = normal(products, free)
     left = linear.residual - columns[..., free] @ (np.linalg.solve(own, cross) / scale)
-    return [(terms[place - len(base)], gain) for place, gain in found], left
+    volume = _log_volume(whitener[used], linear.starts[used])
+    return Choice([(terms[place - len(base)], gain) for place, gain in found], left, volume - left_over(products, free))
+
+
+def _log_volume(whitener: Array, starts: Array) -> float:
+    """What a law's restricted log-likelihood has besides the squares, from its whitener (windows, numbers, numbers) and
+    the derivatives by start states (windows, numbers, 5)."""
+    own = np.diagonal(whitener, axis1=1, axis2=2)
+    answers = whitener @ starts
+    length = np.linalg.norm(answers, axis=1, keepdims=True)
+    length = np.where(length > 0.0, length, 1.0)  # a window without any pose
+    unit = answers / length
+    information = unit.transpose(0, 2, 1) @ unit + 1e-12 * np.eye(starts.shape[2])
+    seen = np.log(own[own > 0.0]).sum()
+    return float(seen - 0.5 * np.linalg.slogdet(information)[1].sum() - np.log(length).sum())

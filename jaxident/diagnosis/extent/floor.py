@@ -52,7 +52,7 @@ def wander_of(solution: Solution, windows: Windows, law: Law, inverse: Array, se
     """Mean squared errors (replays,) that the uncertainty of a fit's own parameters makes at the horizon of its
     windows, over the camera's variance: the least that a corrected model can miss; inverse: `gap.early_inverse`."""
     linear = solution.linear
-    ends = ends_of(solution.vector, linear.residual, windows, inverse)
+    ends = ends_of(linear.starts, inverse)
     scale = np.sqrt(np.diagonal(solution.covariance))
     values, vectors = np.linalg.eigh(solution.covariance / scale[:, None] / scale)
     normal = np.random.default_rng(seed).normal(size=(len(scale), REPLAYS))

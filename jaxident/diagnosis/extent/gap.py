@@ -10,7 +10,7 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.motion.linear import follow
-from jaxident.diagnosis.motion.responses import Responses, answer_to_start, modelled_path
+from jaxident.diagnosis.motion.responses import Responses, modelled_path
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.diagnosis.noise.law import Law, covariance, deviations
 
@@ -74,10 +74,9 @@ class Ends(NamedTuple):
         return columns[:, -3:] - self.early @ columns[:, : self.early.shape[2]]
 
 
-def ends_of(vector: Array, residual: Array, windows: Windows, inverse: Array) -> Ends:
-    """The linear estimate of start states from their first rows (`early_inverse`), about the path of a model (SIZE,)
-    with some residuals (windows, numbers)."""
-    slope = answer_to_start(np.exp(vector[:2]), residual, windows)
+def ends_of(slope: Array, inverse: Array) -> Ends:
+    """The linear estimate of start states from their first rows (`early_inverse`); slope (windows, numbers, 5) are the
+    derivatives of the modelled poses by the start state."""
     early = slope[:, : inverse.shape[1]]
     normal = early.transpose(0, 2, 1) @ inverse @ early
     return Ends(slope[:, -3:] @ np.linalg.solve(normal + 1e-9 * _scale(normal), early.transpose(0, 2, 1) @ inverse))

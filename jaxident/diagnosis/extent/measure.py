@@ -12,7 +12,7 @@ from jaxident.diagnosis.extent.gap import early_inverse, ends_of, last_errors, s
 from jaxident.diagnosis.extent.shrink import HIGH, LOW, Shrink, interval, shrink_of
 from jaxident.diagnosis.extent.where import Place, increments, locate
 from jaxident.diagnosis.motion.coordinates import COORDINATES, NOMINAL, PLACES, neutral_vector
-from jaxident.diagnosis.motion.linear import follow
+from jaxident.diagnosis.motion.linear import follow, linearise
 from jaxident.diagnosis.motion.responses import Responses, modelled_path, respond
 from jaxident.diagnosis.motion.windows import Windows, cut
 from jaxident.diagnosis.noise.doubt import Draws, draw_laws, sizes_by_memory
@@ -61,10 +61,11 @@ def measure(prepared: Prepared, finding: Finding, given, common, seed: int = 0) 
     base = _with(finding, common).vector
     told = base if given is None else np.concatenate([given, finding.nominal.vector[len(given) :]])
     vectors = np.stack([told, base, best.vector, *(c.solution.vector for c in singles.values())])
-    responses, residual, starts = _settled(best.vector, windows, law)
+    responses, linear, starts = _settled(best.vector, windows, law)
+    residual = linear.residual
     inverse = early_inverse(law, windows, responses, BURN)
     found = last_errors(vectors, np.tile(starts, (len(vectors), 1, 1)), windows, law, inverse) ** 2
-    ends = ends_of(best.vector, residual, windows, inverse)
+    ends = ends_of(linear.starts, inverse)
     own_inverse = early_inverse(law, finding.data.windows, fitted, BURN)
     replay = floor_of(residual, windows, law, draws, responses, ends, seed)
     least = None
@@ -162,9 +163,9 @@ def pick(windows: Windows, chosen, count: int) -> Windows:
 
 
 def _settled(vector, windows: Windows, law: Law):
-    """Responses, residuals and starts of windows under a model, start states from all their rows; its parameters stay,
-    for these windows serve no fit."""
+    """Responses, linearisation by start states and starts of windows under a model, start states from all their rows;
+    its parameters stay, for these windows serve no fit."""
     white = white_whitener(law, windows)
     starts = settle(vector, first_starts(windows), windows, white**2)
-    residual = follow(vector[None], starts[None], windows)[0]
-    return respond(np.exp(vector[:2]), residual, windows), residual, starts
+    linear = linearise(vector, starts, windows, [])
+    return respond(np.exp(vector[:2]), linear.residual, windows), linear, starts

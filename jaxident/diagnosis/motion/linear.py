@@ -23,6 +23,10 @@ PART = 1e-5
 """Of a coordinate's size: the step of a difference."""
 
 
+START_STEPS = np.array([1e-5, 1e-4])
+"""Steps of differences by the speed along [m/s] and the turn rate [rad/s] at the start."""
+
+
 class Linear(NamedTuple):
     """Residuals (windows, numbers), derivatives of the modelled poses by coordinates (windows, numbers, columns) and by
     the own start state (windows, numbers, 5); numbers are rows times x, y, heading."""
@@ -63,19 +67,21 @@ def follow(vectors: Array, starts: Array, windows: Windows) -> np.ndarray:
 
 
 def linearise(vector: Array, starts: Array, windows: Windows, places: list[int]) -> Linear:
-    """At a vector (SIZE,) and starts (5, windows), by the coordinates at some places of the vector.
-
-    Start states answer in closed form, as those of the nominal robot do: they are eliminated, not reported.
-    """
+    """At a vector (SIZE,) and starts (5, windows), by the coordinates at some places of the vector."""
     step = PART * sizes()
     _, high = limits()
     step = np.where(vector + step > high, -step, step)[places]
     columns = len(places)
-    vectors = np.tile(vector, (1 + columns, 1))
+    vectors = np.tile(vector, (1 + columns + 2, 1))
     vectors[1 + np.arange(columns), places] += step
-    found = follow(vectors, np.broadcast_to(starts, (len(vectors), *starts.shape)), windows)
+    lanes = np.tile(starts, (len(vectors), 1, 1))
+    lanes[[-2, -1], [3, 4]] += START_STEPS[:, None]
+    found = follow(vectors, lanes, windows)
     change = np.moveaxis(found[:1] - found[1:], 0, -1)
-    return Linear(found[0], change / step, answer_to_start(np.exp(vector[:2]), found[0], windows))
+    # by position and heading in closed form; a robot that loses speed to friction or in turns is not slowed as it says
+    answers = answer_to_start(np.exp(vector[:2]), found[0], windows)
+    answers[..., 3:] = change[..., columns:] / START_STEPS
+    return Linear(found[0], change[..., :columns] / step, answers)
 
 
 def gram(whitener: Array, columns: Array, starts: Array) -> Gram:
