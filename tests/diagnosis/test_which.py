@@ -66,17 +66,25 @@ def test_three_effects_pay_for_each_beyond_the_first():
     assert form_price(("camera_tilt", "lens_distortion")) == FORM
 
 
-@pytest.mark.parametrize(("left", "selected"), [(40.0, (FIRST, OTHER)), (80.0, (FIRST,)), (4e3, (FIRST, OTHER))])
-def test_a_further_effect_must_be_worth_two_of_the_terms_that_are_left(monkeypatch, left, selected):
-    """It brings 125 less 4 for its coordinate and 10 for form; the largest term brings 40, 80, or all that is left."""
+@pytest.mark.parametrize(
+    ("left", "alone", "selected"),
+    [(40.0, 40.0, (FIRST, OTHER)), (80.0, 80.0, (FIRST,)), (80.0, 4e3, (FIRST, OTHER)), (4e3, 4e3, (FIRST, OTHER))],
+)
+def test_a_further_effect_must_be_worth_two_of_the_terms_that_are_left(monkeypatch, left, alone, selected):
+    """It brings 125 less 4 for its coordinate and 10 for form; the largest term that both leave, or the first alone,
+    brings 40, 80, or so much that the gap is unknown: then both stay."""
     term = Term("drive", "v^3 in the acceleration along")
     monkeypatch.setattr(which, "resized", lambda solution, data, responses, law, *rest: law)
-    monkeypatch.setattr(which, "unexplained", lambda *args: ([(term, left), (term, 20.0)], Law(1.0, 1.0)))
+
+    def unexplained(data, solution, *rest):
+        return [(term, left if len(solution.effects) > 1 else alone), (term, 20.0)], Law(1.0, 1.0)
+
+    monkeypatch.setattr(which, "unexplained", unexplained)
     gains = {(): 0.0, (FIRST,): 10_000.0, (OTHER,): 9_000.0, (FIRST, OTHER): 10_125.0}
     found = {e: Candidate(e, SimpleNamespace(effects=e), gain) for e, gain in gains.items()}
     finding = which._defended(which.Search(found, None, None, Law(1.0, 1.0), (FIRST, OTHER)), True)
     assert finding.selected == selected
-    assert finding.further == 2.0 * left
+    assert finding.further == 2.0 * (left if selected == (FIRST, OTHER) else alone)
 
 
 def test_the_rival_is_the_best_set_of_one_effect_more_whatever_its_form_costs():

@@ -72,8 +72,8 @@ def search_effects(
 
 
 def _defended(now: Search, sized: bool) -> Finding:
-    """What the set leaves, or a smaller one, if further effects are not worth what is left; a set that leaves so much
-    that the gap is unknown claims none of its names, and stays as near as it is."""
+    """What the set leaves, or a smaller one, if further effects are not worth what is left, unless that would leave so
+    much that the gap is unknown; a set that does so itself claims none of its names, and stays as near as it is."""
     solution = now.found[now.selected].solution
     # once more even for the same set: the law before came from a fit under the nominal one's noise, which is too large
     likely = resized(solution, now.data, now.responses, now.law, sized, LIKELY)
@@ -83,7 +83,10 @@ def _defended(now: Search, sized: bool) -> Finding:
         return finding
     smaller = [effects for effects in now.found if 0 < len(effects) < len(now.selected)]
     best = max([now.selected, *smaller], key=lambda effects: value(now.found[effects], finding.further))
-    return finding if best == now.selected else _defended(now._replace(selected=best), sized)
+    if best == now.selected:
+        return finding
+    less = _defended(now._replace(selected=best), sized)
+    return finding if less.unexplained > UNEXPLAINED else less
 
 
 def _beside_rival(now: Search, without: Collection[str]) -> Search:
