@@ -24,6 +24,8 @@ from jaxident.robot.drive import Physical
 
 BURN = 20
 """Rows from which a window's start state is estimated before the horizon begins."""
+FEWEST = 3
+"""Poses among the first rows of a window that tell its start state, five numbers."""
 LONGEST, SHORTEST = 60, 20
 """Rows of a horizon where none is asked for: cost grows with their cube, sensitivity with their number."""
 HORIZON = 1.0
@@ -158,12 +160,16 @@ def first_starts(windows: Windows) -> np.ndarray:
 def roles(windows: Windows) -> np.ndarray:
     """Windows that name, boolean (windows,); the others, every third run from the second on, only judge the gap.
 
-    Of one or two runs it is stretches of four windows, so that both purposes see early and late.
+    Of one or two runs it is stretches of four windows, so that both purposes see early and late. Windows that do not
+    show their start name nothing: a speed of a second ago is a guess, and one guess far off bends a whole fit.
     """
-    if len(np.unique(windows.run)) >= 3:
-        return windows.run % 3 != 1
-    order = np.arange(len(windows.run))
-    return (order // 2) % 3 != 1
+    order = windows.run if len(np.unique(windows.run)) >= 3 else np.arange(len(windows.run)) // 2
+    return (order % 3 != 1) & shows_start(windows)
+
+
+def shows_start(windows: Windows) -> np.ndarray:
+    """Windows, boolean, that have poses enough among their first rows."""
+    return np.sum(windows.seen[:BURN], axis=0) >= FEWEST
 
 
 def find_repeats(log: Log) -> np.ndarray:

@@ -6,11 +6,11 @@ from support.arcs import along_arcs
 
 from jaxident.diagnosis.extent import gap
 from jaxident.diagnosis.extent.floor import Floor
-from jaxident.diagnosis.extent.measure import FEWEST, judging_windows
+from jaxident.diagnosis.extent.measure import judging_windows
 from jaxident.diagnosis.extent.shrink import interval, shrink_of
 from jaxident.diagnosis.extent.where import Region, _discoveries, _regions, increments
 from jaxident.diagnosis.motion.responses import modelled_path
-from jaxident.diagnosis.prepare import BURN, Prepared
+from jaxident.diagnosis.prepare import BURN, FEWEST, Prepared, roles
 from jaxident.errors import InputError
 
 COUNT = 90
@@ -177,3 +177,15 @@ def test_a_turned_marker_looks_like_sideways_movement():
     np.testing.assert_allclose(seen[1], lateral * np.cos(0.1) - along * np.sin(0.1), atol=1e-12)
     np.testing.assert_allclose(seen[2], heading, atol=1e-12)
     assert np.abs(along).max() > 0.0
+
+
+@pytest.mark.parametrize("runs", [1, 4])
+def test_windows_that_do_not_show_their_start_name_nothing(runs):
+    windows = along_arcs(40, 24)
+    windows = windows._replace(run=np.arange(24) % runs)
+    plain = roles(windows)
+    hidden = np.array(windows.seen)
+    hidden[: BURN + 1 - FEWEST, ::5] = False
+    hidden[: BURN - FEWEST, ::4] = False
+    assert 0 < plain.sum() < 24
+    np.testing.assert_array_equal(roles(windows._replace(seen=hidden)), plain & (np.arange(24) % 5 > 0))

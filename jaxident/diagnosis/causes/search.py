@@ -79,7 +79,9 @@ def best_starts(data: Data, vector: Array, starts: Array, moved: Array) -> tuple
     the squares of the windows used: one window that shows little of its start must not stop the others."""
     lanes = starts + np.array(PARTS)[:, None, None] * moved
     residual = follow(np.tile(vector, (len(lanes), 1)), lanes, data.windows)
-    squares = 0.5 * np.sum((data.whitener @ residual[..., None])[..., 0] ** 2, axis=2)
+    with np.errstate(over="ignore", invalid="ignore"):  # a start may run away
+        squares = 0.5 * np.sum((data.whitener @ residual[..., None])[..., 0] ** 2, axis=2)
+    squares = np.where(np.isnan(squares), np.inf, squares)
     best = np.argmin(squares, axis=0)
     chosen = np.take_along_axis(lanes, best[None, None], axis=0)[0]
     return chosen, float(np.sum(squares.min(axis=0)[data.use]))

@@ -18,12 +18,9 @@ from jaxident.diagnosis.motion.windows import Windows, cut
 from jaxident.diagnosis.noise.doubt import Draws, draw_laws, sizes_by_memory
 from jaxident.diagnosis.noise.law import Law, deviations, white_whitener
 from jaxident.diagnosis.noise.sizing import Sized, sample
-from jaxident.diagnosis.prepare import BURN, Prepared, first_starts
+from jaxident.diagnosis.prepare import BURN, FEWEST, Prepared, first_starts, shows_start
 from jaxident.errors import InputError
 from jaxident.log import Log
-
-FEWEST = 3
-"""Poses among the first rows of a window that judges: five numbers of its start state are estimated from them."""
 
 
 class Gap(NamedTuple):
@@ -136,7 +133,7 @@ def judging_windows(prepared: Prepared, rows: int) -> Windows:
     if len(np.unique(windows.run)) >= 3:
         windows = cut(blinded(prepared), rows, stride=max(rows // 3, 1), session=windows.session)
         own = windows.run % 3 == 1
-    chosen = np.flatnonzero(own & (np.sum(windows.seen[:BURN], axis=0) >= FEWEST))
+    chosen = np.flatnonzero(own & shows_start(windows))
     if not chosen.size:
         raise InputError(f"no stretch of the runs kept for judging has {FEWEST} poses in its first {BURN} rows")
     return pick(windows, chosen, len(prepared.naming))
