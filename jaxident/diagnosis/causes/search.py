@@ -15,7 +15,6 @@ ENOUGH = 0.05
 """Promised fall of -log p below which the search ends."""
 LONGEST = 0.5
 """A step changes a rate by at most this much, as a logarithm."""
-
 PARTS = (1.0, 0.25, 0.0)
 """Of the step of a window's start state that are tried."""
 

@@ -21,8 +21,6 @@ from jaxident.diagnosis.motion.windows import Windows
 START_STATES = 5
 PART = 1e-5
 """Of a coordinate's size: the step of a difference."""
-
-
 START_STEPS = np.array([1e-5, 1e-4])
 """Steps of differences by the speed along [m/s] and the turn rate [rad/s] at the start."""
 
