@@ -82,7 +82,6 @@ REGRESSIONS: dict[str, Callable[[Regression], dict]] = {
     "sparse": sparse,
     "held_out": held_out,
 }
-METHODS = ("refit", *REGRESSIONS)
 
 
 def refits(runs: list[Log]) -> dict[str, dict]:
@@ -96,26 +95,37 @@ def regressions(runs: list[Log]) -> dict[str, dict]:
     return {name: method(given) for name, method in REGRESSIONS.items()}
 
 
+FAMILIES: dict[Callable[[list[Log]], dict[str, dict]], tuple[str, ...]] = {
+    refits: ("refit",),
+    regressions: tuple(REGRESSIONS),
+}
+METHODS = tuple(name for names in FAMILIES.values() for name in names)
+
+
 def run(cases: pathlib.Path, out: pathlib.Path) -> None:
     """OUT/METHOD/case_NNN/diagnosis.json of every method that is not there yet."""
     for case in sorted(folder for folder in cases.iterdir() if folder.is_dir()):
-        for names, way in (METHODS[:1], refits), (METHODS[1:], regressions):
-            if all((out / name / case.name / "process.json").exists() for name in names):
-                continue
-            begin, code = time.monotonic(), 0
-            try:
-                found = way(_runs(case))
-            except (InputError, WorkError) as error:
-                print(f"{case.name}: {error}", flush=True)
-                found, code = {}, 1
-            seconds = round(time.monotonic() - begin, 2)
-            for name in names:
-                folder = out / name / case.name
-                folder.mkdir(parents=True, exist_ok=True)
-                if name in found:
-                    (folder / "diagnosis.json").write_text(json.dumps(found[name], indent=1) + "\n")
-                (folder / "process.json").write_text(json.dumps({"seconds": seconds, "exit_code": code}) + "\n")
-            print(f"{case.name}: {', '.join(names)} in {seconds:.1f} s", flush=True)
+        for family, names in FAMILIES.items():
+            folders = {name: out / name / case.name for name in names}
+            if not all((folder / "process.json").exists() for folder in folders.values()):
+                _record(case, family, folders)
+
+
+def _record(case: pathlib.Path, family: Callable, folders: dict[str, pathlib.Path]) -> None:
+    """What the methods of a family say of a case, each in a folder of its own, and how long all took."""
+    begin, code = time.monotonic(), 0
+    try:
+        found = family(_runs(case))
+    except (InputError, WorkError) as error:
+        print(f"{case.name}: {error}", flush=True)
+        found, code = {}, 1
+    seconds = round(time.monotonic() - begin, 2)
+    for name, folder in folders.items():
+        folder.mkdir(parents=True, exist_ok=True)
+        if name in found:
+            (folder / "diagnosis.json").write_text(json.dumps(found[name], indent=1) + "\n")
+        (folder / "process.json").write_text(json.dumps({"seconds": seconds, "exit_code": code}) + "\n")
+    print(f"{case.name}: {', '.join(folders)} in {seconds:.1f} s", flush=True)
 
 
 def _runs(case: pathlib.Path) -> list[Log]:

@@ -6,11 +6,11 @@ import numpy as np
 from jaxident.diagnosis.causes.candidates import Candidate
 from jaxident.diagnosis.causes.search import Data, refit
 from jaxident.diagnosis.causes.which import refit_each
-from jaxident.diagnosis.extent.gap import last_errors, settle
-from jaxident.diagnosis.extent.measure import judging_windows
+from jaxident.diagnosis.extent.gap import early_inverse, last_errors
+from jaxident.diagnosis.extent.measure import judging_windows, settled
 from jaxident.diagnosis.motion.coordinates import COORDINATES
 from jaxident.diagnosis.noise.law import first_law, white_whitener
-from jaxident.diagnosis.prepare import BURN, first_starts, prepare
+from jaxident.diagnosis.prepare import BURN, prepare
 from jaxident.log import Log
 
 
@@ -25,10 +25,10 @@ def refit_errors(runs: list[Log]) -> dict[str, float]:
     found = {(): Candidate((), nominal, 0.0)}
     refit_each(found, data, nominal, list(COORDINATES), ())
     apart = judging_windows(prepared, len(windows.step))
-    inverse = white_whitener(law, apart) ** 2
+    responses, _, starts = settled(nominal.vector, apart, law)
     vectors = np.stack([candidate.solution.vector for candidate in found.values()])
-    starts = settle(nominal.vector, first_starts(apart), apart, inverse)
-    early = inverse[:, : 3 * BURN, : 3 * BURN]
-    errors = last_errors(vectors, np.tile(starts, (len(vectors), 1, 1)), apart, law, early)
-    means = np.nanmean(errors**2, axis=(1, 2))
+    lanes = np.tile(starts, (len(vectors), 1, 1))
+    errors = last_errors(vectors, lanes, apart, law, early_inverse(law, apart, responses, BURN))
+    means = np.mean(errors[:, np.asarray(apart.seen)[-1]] ** 2, axis=(1, 2))
+    means = np.where(np.isfinite(means), means, np.inf)  # a model that ran away predicts nothing
     return {"".join(effects): float(mean) for effects, mean in zip(found, means, strict=True)}

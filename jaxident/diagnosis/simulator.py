@@ -106,7 +106,8 @@ def _search(sim: Log | Sequence[Log], prepared: Prepared, finding: Finding) -> t
 
 
 def is_noisy(white: Law, robot: Law) -> bool:
-    """Whether white camera noise is like that of a robot under some law."""
+    """Whether white camera noise [m], [rad] (`first_law`) is like that of a robot under a law, which may have left none
+    of it white."""
     least = np.maximum([robot.position, robot.heading], FAINT * deviations(robot)[1:])
     return bool(np.any(np.array([white.position, white.heading]) > NOISY * least))
 

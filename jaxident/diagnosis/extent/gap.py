@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.motion.linear import follow
+from jaxident.diagnosis.motion.linear import START_STEPS, follow
 from jaxident.diagnosis.motion.responses import Responses, modelled_path
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.diagnosis.noise.law import Law, covariance, deviations
@@ -57,7 +57,7 @@ def _squares(found: Array, inverse: Array) -> np.ndarray:
 def _by_start(vector: Array, starts: Array, windows: Windows, numbers: int) -> tuple[np.ndarray, np.ndarray]:
     """First residuals (windows, numbers) and derivatives of the modelled poses by the start state (windows, numbers,
     5), by differences: with a traction limit or dry friction a speed does not decay as the nominal one does."""
-    step = np.array([1e-5, 1e-5, 1e-5, 1e-5, 1e-4])
+    step = np.array([1e-5, 1e-5, 1e-5, *START_STEPS])
     lanes = np.concatenate([starts[None], starts + step[:, None, None] * np.eye(5)[:, :, None]])
     found = follow(np.tile(vector, (6, 1)), lanes, windows)[:, :, :numbers]
     return found[0], np.moveaxis((found[0] - found[1:]) / step[:, None, None], 0, -1)

@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from jaxident.array_types import Array
 from jaxident.diagnosis.causes.candidates import Finding
 from jaxident.diagnosis.causes.search import Solution
 from jaxident.diagnosis.causes.unexplained import UNEXPLAINED
@@ -12,7 +13,7 @@ from jaxident.diagnosis.extent.gap import early_inverse, ends_of, last_errors, s
 from jaxident.diagnosis.extent.shrink import HIGH, LOW, Shrink, interval, shrink_of
 from jaxident.diagnosis.extent.where import Place, increments, locate
 from jaxident.diagnosis.motion.coordinates import COORDINATES, NOMINAL, PLACES, neutral_vector
-from jaxident.diagnosis.motion.linear import follow, linearise
+from jaxident.diagnosis.motion.linear import Linear, follow, linearise
 from jaxident.diagnosis.motion.responses import Responses, modelled_path, respond
 from jaxident.diagnosis.motion.windows import Windows, cut
 from jaxident.diagnosis.noise.doubt import Draws, draw_laws, sizes_by_memory
@@ -58,7 +59,7 @@ def measure(prepared: Prepared, finding: Finding, given, common, seed: int = 0) 
     base = _with(finding, common).vector
     told = base if given is None else np.concatenate([given, finding.nominal.vector[len(given) :]])
     vectors = np.stack([told, base, best.vector, *(c.solution.vector for c in singles.values())])
-    responses, linear, starts = _settled(best.vector, windows, law)
+    responses, linear, starts = settled(best.vector, windows, law)
     residual = linear.residual
     inverse = early_inverse(law, windows, responses, BURN)
     found = last_errors(vectors, np.tile(starts, (len(vectors), 1, 1)), windows, law, inverse) ** 2
@@ -159,9 +160,9 @@ def pick(windows: Windows, chosen, count: int) -> Windows:
                             run=windows.run[filled], first=windows.first[filled])  # fmt: skip
 
 
-def _settled(vector, windows: Windows, law: Law):
-    """Responses, linearisation by start states and starts of windows under a model, start states from all their rows;
-    its parameters stay, for these windows serve no fit."""
+def settled(vector: Array, windows: Windows, law: Law) -> tuple[Responses, Linear, np.ndarray]:
+    """Responses, linearisation by start states and starts (5, windows) of windows under a model (SIZE,), start states
+    from all their rows; its parameters stay, for these windows serve no fit."""
     white = white_whitener(law, windows)
     starts = settle(vector, first_starts(windows), windows, white**2)
     linear = linearise(vector, starts, windows, [])
