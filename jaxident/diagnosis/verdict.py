@@ -133,11 +133,13 @@ def believable_excess(simulator: Simulator | None = None) -> float:
 
 def slip_of_drive(finding: Finding) -> float:
     """Random slip as a part of full drive, the larger of along and in heading; slip of another correlation time counts
-    by its spectral density."""
+    by its spectral density. Full drive is that of the selected set: a nominal model that bends for want of an effect
+    may have a tenth of the robot's."""
     law = finding.law
     if law.slip is None or law.slip_time is None:
         return 0.0
-    full = np.abs(finding.nominal.vector[2:6]).reshape(2, 2).sum(axis=1)
+    vector = finding.candidates[finding.selected].solution.vector
+    full = np.abs(vector[2:6]).reshape(2, 2).sum(axis=1)
     return float(np.max(np.array(law.slip) / full) * np.sqrt(law.slip_time / SLOW))
 
 

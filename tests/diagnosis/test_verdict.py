@@ -16,10 +16,13 @@ NONE: dict[str, float] = {}
 GAP = made_up("effects").gap
 
 
+DRIVE = np.array([1.0, 1.5, 0.5, 0.5, 5.0, -5.0])
+
+
 def finding(gains, selected, terms=()):
-    """A search with candidates of some gains."""
-    found = made_up("effects").finding
-    candidates = {effects: Candidate(effects, None, gain) for effects, gain in {(): 0.0, **gains}.items()}
+    """A search with candidates of some gains, which drive alike."""
+    found, fit = made_up("effects").finding, SimpleNamespace(vector=DRIVE)
+    candidates = {effects: Candidate(effects, fit, gain) for effects, gain in {(): 0.0, **gains}.items()}
     return found._replace(candidates=candidates, selected=selected, terms=list(terms))
 
 
@@ -109,11 +112,9 @@ def test_errors_beyond_the_floor_on_runs_kept_for_judging_are_unknown():
 
 
 def test_more_slip_than_wheels_have_is_unknown():
-    nominal = SimpleNamespace(vector=np.array([1.0, 1.5, 0.5, 0.5, 5.0, -5.0]))
-
     def slipping(part):
         law = Law(1e-3, 5e-3, (part * 1.0, part * 10.0), 0.2)
-        return finding({}, ())._replace(law=law, nominal=nominal)
+        return finding({}, ())._replace(law=law)
 
     assert slip_of_drive(slipping(0.01)) == pytest.approx(0.01)
     assert unknown_probability(slipping(0.01), GAP) < 0.05
@@ -122,15 +123,21 @@ def test_more_slip_than_wheels_have_is_unknown():
     assert found.sites["drive"] + found.sites["contact"] > 0.7
 
 
+def test_slip_is_held_against_the_drive_of_the_robot_and_not_of_a_nominal_model_that_bends():
+    bent = finding({("turn_loss",): 900.0}, ("turn_loss",))._replace(law=Law(1e-3, 5e-3, (0.01, 0.1), 0.2))
+    bent = bent._replace(candidates=bent.candidates | {(): Candidate((), SimpleNamespace(vector=0.1 * DRIVE), 0.0)})
+    assert slip_of_drive(bent) == pytest.approx(0.01)
+    assert slip_of_drive(bent._replace(selected=())) == pytest.approx(0.1)
+
+
 def test_what_the_simulator_leaves_unexplained_too_is_no_difference():
     """The same rest and slip in as many windows of both: nothing unknown lies between them; alone it does."""
-    nominal = SimpleNamespace(vector=np.array([1.0, 1.5, 0.5, 0.5, 5.0, -5.0]))
     term = (Term("drive", "v^3 in the acceleration along"), 400.0)
 
     def both(part, rest):
         law = Law(1e-3, 5e-3, (part, part * 10.0), 0.2)
         data = SimpleNamespace(use=np.ones(10, bool))
-        return finding({("slope",): 300.0}, ("slope",), [(term[0], rest)])._replace(law=law, nominal=nominal, data=data)
+        return finding({("slope",): 300.0}, ("slope",), [(term[0], rest)])._replace(law=law, data=data)
 
     robot = both(0.1, 400.0)
     assert unknown_probability(robot, GAP) > 0.95
