@@ -5,7 +5,7 @@ import numpy as np
 
 from jaxident.diagnosis.causes.candidates import Candidate
 from jaxident.diagnosis.causes.search import Data, refit
-from jaxident.diagnosis.causes.which import refit_each
+from jaxident.diagnosis.causes.sets import refit_each
 from jaxident.diagnosis.extent.gap import early_inverse, last_errors
 from jaxident.diagnosis.extent.measure import judging_windows, settled
 from jaxident.diagnosis.motion.coordinates import COORDINATES

@@ -13,13 +13,15 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.causes.candidates import ENOUGH, PENALTY, TERMS, Candidate, Finding, largest
 from jaxident.diagnosis.causes.scores import sizes_of
 from jaxident.diagnosis.causes.search import Solution, refit
+from jaxident.diagnosis.causes.sets import one_more
 from jaxident.diagnosis.causes.unexplained import unexplained
-from jaxident.diagnosis.causes.which import one_more
 from jaxident.diagnosis.motion.coordinates import COORDINATES, NOMINAL, PLACES, free_places, neutral_vector
 from jaxident.diagnosis.motion.responses import respond
 
 BEST = 4
 """Sets of either search that are tried on the other's logs as well."""
+ROUNDS = 4
+"""Searches at most for one effect more beside the best pair of sets."""
 MOSTLY = 0.7
 """Part of an effect's size beyond which a difference of sizes is told as the effect, below as a parameter."""
 
@@ -47,24 +49,46 @@ def explain_together(robot: Finding, simulator: Finding) -> Together:
 
     An effect of both is paid for once; one of either alone must be worth more than ENOUGH, and more than TERMS terms
     that no effect explains bring in both, or beside others in its own logs: as much is made up easily where something
-    is missing. Effects of both take no room: each side is searched once more for another beside them.
+    is missing. Effects of both take no room: each side is searched for others beside them as long as one is found.
     """
-    price = max(ENOUGH, TERMS * min(largest(robot.terms), largest(simulator.terms)))
     theirs, own = _best(simulator), _best(robot)
     robot, simulator = _with_sets(robot, theirs, simulator), _with_sets(simulator, own, robot)
-    chosen, partner, _ = _pair(robot, simulator, price)
-    robot, simulator = one_more(robot, chosen), one_more(simulator, partner)
-    chosen, partner, values = _pair(robot, simulator, price)
+    robot, simulator = _grown(robot, simulator)
+    price = max(ENOUGH, TERMS * min(largest(robot.terms), largest(simulator.terms)))
+    chosen, partner, values = _pair(robot, simulator, price, (robot.further, simulator.further))
     return Together(_reselected(robot, chosen), _reselected(simulator, partner), values, price)
 
 
-def _pair(robot: Finding, simulator: Finding, price: float) -> tuple[tuple[str, ...], tuple[str, ...], Values]:
+def _grown(robot: Finding, simulator: Finding) -> tuple[Finding, Finding]:
+    """Both with sets of ever more effects, and the pair selected that these lead to if every effect costs ENOUGH."""
+    least = ENOUGH, (ENOUGH, ENOUGH)
+    chosen, partner, _ = _pair(robot, simulator, *least)
+    for _ in range(ROUNDS):
+        robot, simulator, before = one_more(robot, chosen), one_more(simulator, partner), (chosen, partner)
+        chosen, partner, _ = _pair(robot, simulator, *least)
+        if (chosen, partner) == before:
+            break
+    robot, simulator = _crossed(robot, chosen, simulator, partner), _crossed(simulator, partner, robot, chosen)
+    chosen, partner, _ = _pair(robot, simulator, *least)
+    return _reselected(robot, chosen), _reselected(simulator, partner)
+
+
+def _crossed(finding: Finding, own: tuple[str, ...], other: Finding, theirs: tuple[str, ...]) -> Finding:
+    """With the other's set refitted here too, alone and beside each effect of the own set: grown apart, the two may
+    have different names for the same thing, or one of them none."""
+    for effects in (theirs, *((*theirs, name) for name in own if name not in theirs)):
+        finding = _with_set(finding, effects, finding.candidates[own], other.candidates[theirs])
+    return finding
+
+
+def _pair(
+    robot: Finding, simulator: Finding, price: float, further: tuple[float, float]
+) -> tuple[tuple[str, ...], tuple[str, ...], Values]:
     """The best set of the robot and the simulator's beside it, and the values of all of the robot's sets."""
     theirs = {
         effects: fit for effects, fit in simulator.candidates.items()
         if all(shows(name, fit, simulator.candidates) for name in effects)
     }  # fmt: skip
-    further = robot.further, simulator.further
     values: Values = {}
     partner: dict[tuple[str, ...], tuple[str, ...]] = {}
     for effects, candidate in robot.candidates.items():
@@ -137,15 +161,21 @@ def _best(finding: Finding) -> list[tuple[str, ...]]:
 
 def _with_sets(finding: Finding, sets: list[tuple[str, ...]], other: Finding) -> Finding:
     """With these sets refitted too, their effects begun where the other search has them."""
-    found = dict(finding.candidates)
     for effects in sets:
-        if not any(set(effects) == set(known) for known in found):
-            vector = np.array(finding.nominal.vector)
-            places = free_places(effects)[len(NOMINAL) :]
-            vector[places] = other.candidates[effects].solution.vector[places]
-            solution = refit(finding.data, vector, finding.nominal.starts, effects)
-            found[effects] = Candidate(effects, solution, finding.nominal.cost - solution.cost)
-    return finding._replace(candidates=found)
+        finding = _with_set(finding, effects, finding.candidates[()], other.candidates[effects])
+    return finding
+
+
+def _with_set(finding: Finding, effects: tuple[str, ...], begin: Candidate, other: Candidate) -> Finding:
+    """With this set refitted too, from a candidate; effects that it has not begin where the other one has them."""
+    if any(set(effects) == set(known) for known in finding.candidates):
+        return finding
+    vector, own = neutral_vector(begin.solution.vector[: len(NOMINAL)]), free_places(begin.effects)
+    for place in free_places(effects)[len(NOMINAL) :]:
+        vector[place] = (begin if place in own else other).solution.vector[place]
+    solution = refit(finding.data, vector, begin.solution.starts, effects)
+    fit = Candidate(effects, solution, finding.nominal.cost - solution.cost)
+    return finding._replace(candidates=finding.candidates | {effects: fit})
 
 
 def _reselected(finding: Finding, selected: tuple[str, ...]) -> Finding:

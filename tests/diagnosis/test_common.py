@@ -40,7 +40,7 @@ def search(gains, selected, term=0.0):
 def together(monkeypatch):
     """Robot and simulator explained by the sets that they have; nothing is refitted."""
     monkeypatch.setattr(common, "one_more", lambda finding, selected: finding)
-    monkeypatch.setattr(common, "_with_sets", lambda finding, sets, other: finding)
+    monkeypatch.setattr(common, "_with_set", lambda finding, effects, begin, other: finding)
     monkeypatch.setattr(common, "_reselected", lambda finding, selected: finding._replace(selected=selected))
     return explain_together
 
@@ -133,3 +133,42 @@ def test_the_same_effect_of_another_size_is_a_parameter_and_hardly_any_of_it_a_d
     assert apart("transport_delay", large, little, PRICE)
     unsure = fit(("transport_delay",), 0.02, deviation=0.05)
     assert not apart("transport_delay", large, unsure, PRICE), "a common size costs hardly anything"
+
+
+def test_what_an_effect_takes_up_is_not_held_against_it(monkeypatch, together):
+    """The robot leaves a term worth 400, and an effect found beside the pair takes all of it for 500: a price of twice
+    the term, as it was before, would keep that effect out."""
+    pair = ("turn_loss", "slope")
+
+    def one_more(finding, selected):
+        more = fit(pair, 0.1, gain=800.0)
+        return finding._replace(candidates=finding.candidates | {pair: more}) if finding.terms else finding
+
+    def reselected(finding, selected):
+        return finding._replace(selected=selected, terms=[] if selected == pair else finding.terms)
+
+    monkeypatch.setattr(common, "one_more", one_more)
+    monkeypatch.setattr(common, "_reselected", reselected)
+    robot, simulator = search({("turn_loss",): 300.0}, ("turn_loss",), 400.0), search({("turn_loss",): 200.0}, ())
+    found = together(robot, simulator._replace(selected=("turn_loss",)))
+    assert found.robot.selected == pair
+    assert found.missing == ("slope",)
+
+
+def test_sets_that_grew_apart_are_tried_in_the_other_s_logs(monkeypatch):
+    """A marker ahead and a slip sideways look alike: each search has taken another, and the robot a slope besides. The
+    simulator's set with that slope, tried on the robot's logs as well, leaves the slope alone as the difference."""
+    costs = {("marker_offset", "slope"): -590.0, ("marker_offset",): -400.0, ("lateral_slip", "slope"): -250.0}
+
+    def refit(data, vector, starts, effects):
+        return fit(effects, 0.1).solution._replace(cost=costs.get(effects, 0.0))
+
+    monkeypatch.setattr(common, "one_more", lambda finding, selected: finding)
+    monkeypatch.setattr(common, "_reselected", lambda finding, selected: finding._replace(selected=selected))
+    monkeypatch.setattr(common, "refit", refit)
+    robot = search({("lateral_slip", "slope"): 600.0, ("slope",): 100.0}, ("lateral_slip", "slope"))
+    simulator = search({("marker_offset",): 300.0}, ("marker_offset",))
+    nominal = fit(()).solution
+    found = explain_together(robot._replace(nominal=nominal), simulator._replace(nominal=nominal))
+    assert set(found.robot.selected) == {"marker_offset", "slope"}
+    assert found.missing == ("slope",)

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from jaxident.diagnosis.causes import which
+from jaxident.diagnosis.causes import sets, which
 from jaxident.diagnosis.causes.candidates import ELSEWHERE, FORM, Candidate, form_price
 from jaxident.diagnosis.causes.corrector import Term
 from jaxident.diagnosis.motion.coordinates import SIZE
@@ -17,12 +17,12 @@ FIRST, SECOND, OTHER = "turn_loss", "supply_sag", "transport_delay"
 @pytest.fixture
 def exchange(monkeypatch):
     """The set chosen from sets and their gains; nothing further is tried."""
-    monkeypatch.setattr(which, "_scores", lambda data, solution, without: {})
-    monkeypatch.setattr(which, "refit_each", lambda found, data, begin, names, beside: None)
+    monkeypatch.setattr(sets, "scores_of", lambda data, solution, without: {})
+    monkeypatch.setattr(sets, "refit_each", lambda found, data, begin, names, beside: None)
 
     def chosen(gains, selected):
         found = {effects: Candidate(effects, None, gain) for effects, gain in {(): 0.0, **gains}.items()}
-        return which._exchange(found, None, selected, ())
+        return sets.exchange(found, None, selected, ())
 
     return chosen
 
@@ -100,7 +100,8 @@ def test_beside_a_rival_there_is_a_single_effect_left_to_grow_from(exchange, mon
     """However many larger sets are better: the search begins with one effect."""
     costs = {(): 900.0, (FIRST,): 700.0, (SECOND,): 800.0, (FIRST, SECOND): 200.0}
     costs |= {(FIRST, SECOND, name): 100.0 for name in ("slope", "motor_lag", "backlash", OTHER)}
-    monkeypatch.setattr(which, "refit", lambda data, vector, starts, effects: fit(effects))
+    for module in (which, sets):
+        monkeypatch.setattr(module, "refit", lambda data, vector, starts, effects: fit(effects))
     monkeypatch.setattr(which, "resized", lambda *args, **options: Law(0.5, 1.0))
     monkeypatch.setattr(which, "whiten", lambda *args: (data, None))
     data = SimpleNamespace(windows=None, use=None)
@@ -111,3 +112,32 @@ def test_beside_a_rival_there_is_a_single_effect_left_to_grow_from(exchange, mon
     found = {effects: Candidate(effects, fit(effects), 900.0 - cost) for effects, cost in costs.items()}
     now = which.Search(found, data, None, Law(1.0, 1.0), (FIRST, SECOND))
     assert set(which._beside_rival(now, ()).selected) >= {FIRST, SECOND}
+
+
+@pytest.mark.parametrize(("third", "fifth", "selected"), [(200.0, 300.0, 5), (200.0, 5.0, 4), (5.0, 300.0, 2)])
+def test_a_search_that_has_filled_its_room_gets_more(monkeypatch, third, fifth, selected):
+    """Five effects, the third and the fifth worth something or nothing: a set that stopped short of three stays."""
+    gains = np.cumsum([9000.0, 3000.0, third, 300.0, fifth])
+    effects = (FIRST, SECOND, OTHER, "marker_offset", "slope")
+
+    def fit(own):
+        linear = SimpleNamespace(residual=None)
+        return SimpleNamespace(effects=own, vector=np.zeros(SIZE), starts=None, linear=linear)
+
+    def refit_each(found, data, begin, names, beside):
+        own = effects[: len(beside) + 1]
+        if beside == effects[: len(beside)] and len(beside) < 5:
+            found[own] = Candidate(own, fit(own), gains[len(beside)])
+
+    monkeypatch.setattr(sets, "refit_each", refit_each)
+    monkeypatch.setattr(sets, "scores_of", lambda data, solution, without: {})
+    monkeypatch.setattr(sets, "exchange", lambda found, data, selected, without: selected)
+    monkeypatch.setattr(which, "exchange", sets.exchange)
+    monkeypatch.setattr(which, "respond", lambda *args: None)
+    monkeypatch.setattr(which, "resized", lambda solution, data, responses, law, *rest, **options: law)
+    monkeypatch.setattr(which, "unexplained", lambda data, solution, *rest: ([], Law(1.0, 1.0)))
+    found = {(): Candidate((), fit(()), 0.0)}
+    found |= {effects[:k]: Candidate(effects[:k], fit(effects[:k]), gains[k - 1]) for k in (1, 2, 3)}
+    data = SimpleNamespace(windows=None)
+    before = which._defended(which.Search(found, data, None, Law(1.0, 1.0), effects[: 3 if third > 9.0 else 2]), True)
+    assert which.enlarge(before).selected == effects[:selected]

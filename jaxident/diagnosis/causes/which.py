@@ -6,18 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.candidates import ENOUGH, PENALTY, Candidate, Finding, value
-from jaxident.diagnosis.causes.scores import INSTANT, STEP, at_best, beginnings, score
+from jaxident.diagnosis.causes.candidates import ENOUGH, Candidate, Finding, value
 from jaxident.diagnosis.causes.search import Data, Solution, refit
+from jaxident.diagnosis.causes.sets import exchange, grow, ranked, refit_each, scores_of
 from jaxident.diagnosis.causes.unexplained import UNEXPLAINED, unexplained
-from jaxident.diagnosis.motion.coordinates import (
-    COORDINATES,
-    NOMINAL,
-    SHAPES,
-    STEPPED,
-    free_places,
-    neutral_vector,
-)
 from jaxident.diagnosis.motion.responses import Responses, respond
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.diagnosis.noise.law import Law, is_quieter, whitener_of
@@ -29,8 +21,9 @@ REFITS, KEPT = 6, 4
 best leaves."""
 TAKEN = 0.7
 """Part of some noise that is left beside one more effect where the law before took that effect for noise."""
-MOST_EFFECTS, BESIDE = 3, 4
-"""Effects in a set at most, and how many are refitted beside a set before one is accepted."""
+FIRST_EFFECTS, MOST_EFFECTS = 3, 6
+"""Effects in a set at most, as long as commands may still be found lost and in the end: a real robot has four or five,
+and what has no room is a term that others must be worth twice."""
 LIKELY = 1.0
 """Gain for which slip enters the law that the gap is held against: a floor without slip that is as likely there as not
 would be too low, and too sure."""
@@ -56,19 +49,37 @@ def search_effects(
     """
     data, responses = whiten(nominal, windows, use, law)
     nominal = refit(data, nominal.vector, nominal.starts, ())
-    scores = _scores(data, nominal, without)
+    scores = scores_of(data, nominal, without)
     found: dict[tuple[str, ...], Candidate] = {(): Candidate((), nominal, 0.0)}
     refit_each(found, data, nominal, _with_look_alikes(scores), ())
     best = max(found.values(), key=lambda c: c.evidence)
     again = resized(best.solution, data, responses, law, sized)
     data, responses = whiten(best.solution, windows, use, again)
     found = _again(found, data)
-    scores = _scores(data, found[()].solution, without)
+    scores = scores_of(data, found[()].solution, without)
     refit_each(found, data, found[()].solution, [n for n in _with_look_alikes(scores) if (n,) not in found], ())
     now = Search(found, data, responses, again, _choose(found, data, without))
     if sized:
         now = _beside_rival(now, without)
     return _defended(now, sized)
+
+
+def enlarge(finding: Finding) -> Finding:
+    """A search gone on with room for MOST_EFFECTS where it had filled what it had."""
+    found, data = dict(finding.candidates), finding.data
+    full, less = (
+        max((c for c in found.values() if len(c.effects) == count), key=lambda c: c.evidence, default=None)
+        for count in (FIRST_EFFECTS, FIRST_EFFECTS - 1)
+    )
+    if full is None or less is None or full.evidence < less.evidence + ENOUGH:
+        return finding
+    selected = exchange(found, data, grow(found, data, (), full.effects, MOST_EFFECTS), ())
+    if len(selected) <= FIRST_EFFECTS:
+        return finding
+    solution = found[selected].solution
+    responses = respond(np.exp(solution.vector[:2]), solution.linear.residual, data.windows)
+    now = Search(found, data, responses, finding.likely, selected)
+    return _defended(_beside_rival(now, (), MOST_EFFECTS), sized=True)
 
 
 def _defended(now: Search, sized: bool) -> Finding:
@@ -89,7 +100,7 @@ def _defended(now: Search, sized: bool) -> Finding:
     return finding if less.unexplained > UNEXPLAINED else less
 
 
-def _beside_rival(now: Search, without: Collection[str]) -> Search:
+def _beside_rival(now: Search, without: Collection[str], most: int = FIRST_EFFECTS) -> Search:
     """The search once more under the noise beside the best set of one effect more, or beside a set of several itself,
     if that is much less: the noise so far had taken the last effect up, and left it too little to gain."""
     rival = _rival(now.found, now.selected) or now.found[now.selected]
@@ -102,12 +113,15 @@ def _beside_rival(now: Search, without: Collection[str]) -> Search:
     first = max((effects for effects in now.found if len(effects) == 1), key=lambda e: now.found[e].evidence)
     parts = [effects for effects in now.found if set(effects) <= set(rival.effects)]
     found = _again(now.found, data, [first, *parts])  # else sets alone might be left, and none to grow from
-    return Search(found, data, responses, law, _choose(found, data, without))
+    return Search(found, data, responses, law, _choose(found, data, without, most))
 
 
-def _choose(found: dict, data: Data, without: Collection[str]) -> tuple[str, ...]:
+def _choose(found: dict, data: Data, without: Collection[str], most: int = FIRST_EFFECTS) -> tuple[str, ...]:
     """The set that grows from the best single effect, each of it exchanged where another is better."""
-    return _exchange(found, data, _grow(found, data, without), without)
+    best = max((c for c in found.values() if len(c.effects) == 1), key=lambda c: c.evidence, default=None)
+    if best is None or best.evidence <= ENOUGH:
+        return ()
+    return exchange(found, data, grow(found, data, without, best.effects, most), without)
 
 
 def resized(solution: Solution, data: Data, responses: Responses, law: Law, sized: bool, worth: float = WORTH) -> Law:
@@ -135,46 +149,6 @@ def _again(found: dict, data: Data, also: Collection[tuple[str, ...]] = ()) -> d
     return fresh
 
 
-def refit_each(found: dict, data: Data, begin: Solution, names: list[str], beside: tuple[str, ...]) -> None:
-    """Refit every named effect beside others from a solution, and keep what comes out."""
-    cost = found[()].solution.cost
-    for name in names:
-        effects = (*beside, name)
-        for vector in beginnings(data, begin, name):
-            solution = _refit_with_shapes(data, vector, begin.starts, effects)
-            if effects not in found or solution.cost < found[effects].solution.cost:
-                found[effects] = Candidate(effects, solution, cost - solution.cost)
-
-
-def _refit_with_shapes(data: Data, vector: Array, starts: Array, effects: tuple[str, ...]) -> Solution:
-    """A refit that first finds the size of the last effect: what only shapes it is lost until then."""
-    shapes = tuple(pair for pair in SHAPES - STEPPED if pair[0] == effects[-1])
-    searched = next((pair for pair in (INSTANT, STEP) if pair[0] == effects[-1]), None)
-    if shapes or searched:
-        first = refit(data, vector, starts, effects, shapes, most=4)
-        vector, starts = first.vector, first.starts
-        if searched:
-            vector = at_best(data, first, searched)
-    return refit(data, vector, starts, effects)
-
-
-def _grow(found: dict, data: Data, without: Collection[str]) -> tuple[str, ...]:
-    """Effects accepted one after the other, each for a joint refit that is worth it."""
-    selected: tuple[str, ...] = ()
-    singles = sorted((c for e, c in found.items() if len(e) == 1), key=lambda c: -c.evidence)
-    if singles and singles[0].evidence > ENOUGH:
-        selected = singles[0].effects
-    while selected and len(selected) < MOST_EFFECTS:
-        now = found[selected]
-        _one_more(found, data, selected, without)
-        more = [c for e, c in found.items() if len(e) == len(selected) + 1]
-        best = max(more, key=lambda c: c.evidence, default=None)
-        if best is None or best.evidence < now.evidence + ENOUGH:
-            break
-        selected = best.effects
-    return selected
-
-
 def _rival(found: dict, selected: tuple[str, ...]) -> Candidate | None:
     """The best set of one effect more, if it is worth its coordinates, whatever its form may cost."""
     more = [c for e, c in found.items() if len(e) == len(selected) + 1 and set(selected) < set(e)]
@@ -183,54 +157,8 @@ def _rival(found: dict, selected: tuple[str, ...]) -> Candidate | None:
     return best if best is not None and best.gain - best.price > now.gain - now.price + ENOUGH else None
 
 
-def _one_more(found: dict, data: Data, selected: tuple[str, ...], without: Collection[str]) -> None:
-    """Refit the effects that a set leaves most room for, each beside it."""
-    solution = found[selected].solution
-    scores = _scores(data, solution, without)
-    names = [n for n in _ranked(scores) if n not in selected and scores[n] > ENOUGH][:BESIDE]
-    refit_each(found, data, solution, names, selected)
-
-
-def one_more(finding: Finding, selected: tuple[str, ...]) -> Finding:
-    """The search with sets of one effect more than some set of it."""
-    found = dict(finding.candidates)
-    _one_more(found, finding.data, selected, ())
-    return finding._replace(candidates=found)
-
-
-def _exchange(found: dict, data: Data, selected: tuple[str, ...], without: Collection[str]) -> tuple[str, ...]:
-    """The best set of several when each effect in turn is left out or gives way to another: the first was accepted
-    without knowing the others."""
-    if len(selected) < 2:
-        return selected
-    for name in selected:
-        rest = tuple(other for other in selected if other != name)
-        if not any(set(rest) == set(effects) for effects in found):
-            solution = found[selected].solution
-            vector = neutral_vector(solution.vector[: len(NOMINAL)])
-            for place in free_places(rest):
-                vector[place] = solution.vector[place]
-            reduced = refit(data, vector, solution.starts, rest)
-            found[rest] = Candidate(rest, reduced, found[()].solution.cost - reduced.cost)
-        beside = next(effects for effects in found if set(rest) == set(effects))
-        scores = _scores(data, found[beside].solution, (*without, *selected))
-        known = [set(effects) for effects in found]
-        names = [n for n in _ranked(scores)[:3] if scores[n] > ENOUGH and {*rest, n} not in known]
-        refit_each(found, data, found[beside].solution, names, beside)
-    # a larger set must be worth as much more as when sets grow
-    return max(found.values(), key=value).effects
-
-
-def _scores(data: Data, solution: Solution, without: Collection[str]) -> dict[str, float]:
-    return {name: gain for name, gain in score(data, solution).items() if name not in without}
-
-
-def _ranked(scores: dict[str, float]) -> list[str]:
-    return sorted(scores, key=lambda name: -(scores[name] - PENALTY * len(COORDINATES[name])))
-
-
 def _with_look_alikes(scores: dict[str, float]) -> list[str]:
     """The best by score, and what the catalogue says the first two are confused with."""
-    best = _ranked(scores)[:REFITS]
+    best = ranked(scores)[:REFITS]
     near = [other for name in best[:2] for other in CATALOGUE[name].confused_with if other in scores]
     return list(dict.fromkeys([*best, *near]))
