@@ -1,4 +1,4 @@
-"""Which effect: scores of all from the nominal fit, full refits of the best, then a second and a third beside it."""
+"""Which effect: scores of all from the nominal fit, full refits of the best, then more beside them, one by one."""
 
 from collections.abc import Collection
 from typing import NamedTuple
