@@ -49,7 +49,8 @@ def explain_together(robot: Finding, simulator: Finding) -> Together:
 
     An effect of both is paid for once; one of either alone must be worth more than ENOUGH, and more than TERMS terms
     that no effect explains bring in both, or beside others in its own logs: as much is made up easily where something
-    is missing. Effects of both take no room: each side is searched for others beside them as long as one is found.
+    is missing. Effects of both take no room: first both grow as long as an effect more is found, whatever is left, and
+    what the sets then leave decides the price; what an effect takes up must not be held against it.
     """
     theirs, own = _best(simulator), _best(robot)
     robot, simulator = _with_sets(robot, theirs, simulator), _with_sets(simulator, own, robot)

@@ -79,6 +79,8 @@ def prepare(
     rows, horizon = horizon_rows(horizon, period)
     windows = cut(log, BURN + rows)
     naming = roles(windows)
+    if not shows_start(windows).any():
+        raise InputError(f"no stretch of {BURN + rows} rows has {FEWEST} poses among its first {BURN}")
     if not naming.any() or naming.all():
         raise InputError(
             f"{len(log.t)} rows make {len(naming)} windows of {BURN + rows} rows: too few to name and to judge; "

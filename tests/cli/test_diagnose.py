@@ -41,6 +41,17 @@ def test_missing_files_and_short_runs_are_refused(tmp_path):
     assert "too few to name and to judge" in refused(str(tmp_path / "short.csv"), "--out", str(tmp_path / "out"))
 
 
+def test_logs_whose_stretches_never_show_their_start_are_refused(tmp_path):
+    """The camera sees the second half of every two seconds only."""
+    rng = np.random.default_rng(1)
+    t = np.arange(1200) * 0.05
+    u = np.sign(np.sin(t))
+    pose = [np.cumsum(0.01 * u), 1e-3 * rng.normal(size=1200), np.cumsum(0.005 * u)]
+    seen = np.arange(1200) % 40 >= 20
+    write_log(make_log(t, u, 0.5 * u, *(np.where(seen, column, np.nan) for column in pose)), tmp_path / "log.csv")
+    assert "poses among its first 20" in refused(str(tmp_path / "log.csv"), "--out", str(tmp_path / "out"))
+
+
 def test_sim_takes_all_words_up_to_the_next_option():
     words = ["real_1.csv", "real_2.csv", "--sim", "sim_1.csv", "sim_2.csv", "--out", "found"]
     given = command.make_context("diagnose", words).params

@@ -8,7 +8,9 @@ from support.diagnoses import made_up
 
 from jaxident.diagnosis.causes.candidates import Candidate
 from jaxident.diagnosis.causes.corrector import Term
+from jaxident.diagnosis.diagnose import decide
 from jaxident.diagnosis.noise.law import Law
+from jaxident.diagnosis.prepare import BURN, FEWEST
 from jaxident.diagnosis.simulator import Simulator
 from jaxident.diagnosis.verdict import alike, judge, slip_of_drive, unknown_probability
 
@@ -144,3 +146,18 @@ def test_what_the_simulator_leaves_unexplained_too_is_no_difference():
     assert unknown_probability(robot, GAP, Simulator(np.zeros(3), (), both(0.1, 400.0))) < 0.05
     assert unknown_probability(robot, GAP, Simulator(np.zeros(3), (), both(0.1, 40.0))) > 0.95, "terms"
     assert unknown_probability(robot, GAP, Simulator(np.zeros(3), (), both(0.01, 400.0))) > 0.95, "slip"
+
+
+def test_stretches_that_do_not_show_their_start_judge_nothing():
+    """Nine windows name and six are kept for judging: without poses in their first rows nothing is decided."""
+    found = made_up("effects")
+    seen = np.ones((2 * BURN, 15), bool)
+
+    def verdict():
+        naming = np.arange(15) < 9
+        prepared = found.prepared._replace(windows=SimpleNamespace(seen=seen), naming=naming)
+        return decide(prepared, found.judgement, found.parameters)
+
+    assert verdict() == "effects"
+    seen[FEWEST - 1 : BURN, 9:] = False
+    assert verdict() == "undecided"
