@@ -83,20 +83,21 @@ def world(body: Body) -> str:
 
 
 def _wheel(body: Body, k: int, side: str) -> str:
-    """A wheel, with its rotor on the same shaft or, with play, beside it."""
+    """A wheel, with its rotor on the same shaft or, with play, beside it; the rotor's inertia is its joint's, for a body
+    that light would stand for a huge box to the air."""
     place = (-0.5 if side == "r" else 0.5) * body.track
     loose = body.play[k] > 0.0
-    armature = 0.0 if loose else body.rotor
+    on_shaft = 0.0 if loose else body.rotor
     critical, pressed = 2.0 * (SPRING * body.wheel_mass) ** 0.5, 0.5 * CARRIED * body.mass * GRAVITY / SPRING
     wheel = (
         f'<body pos="0 {place} 0"><joint type="slide" axis="0 0 1" stiffness="{SPRING}" damping="{critical}" '
-        f'springref="{-pressed}"/><joint name="hinge_{side}" axis="0 1 0" armature="{armature}" '
+        f'springref="{-pressed}"/><joint name="hinge_{side}" axis="0 1 0" armature="{on_shaft}" '
         f'frictionloss="{body.dry[k]}"/><geom name="tyre_{side}" type="ellipsoid" mass="{body.wheel_mass}" '
         f'size="{body.radius} 0.008 {body.radius}"/></body>'
     )
     rotor = (
-        f'<body pos="0 {0.5 * place} 0"><joint name="rotor_{side}" axis="0 1 0"/>'
-        f'<inertial pos="0 0 0" mass="1e-4" diaginertia="{body.rotor} {body.rotor} {body.rotor}"/></body>'
+        f'<body pos="0 {0.5 * place} 0"><joint name="rotor_{side}" axis="0 1 0" armature="{body.rotor}"/>'
+        '<inertial pos="0 0 0" mass="1e-4" diaginertia="1e-9 1e-9 1e-9"/></body>'
     )
     return wheel + rotor * loose
 

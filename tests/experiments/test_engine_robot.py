@@ -48,6 +48,13 @@ def test_a_payload_counts_from_its_instant_on(plain):
     assert np.abs(later[-1] - plain[-1]).max() > 1e-3
 
 
+def test_air_slows_the_body_and_not_the_rotors_of_loose_gears(plain):
+    """A rotor whose inertia was its light body's stood for a box of metres to the air, and held the robot."""
+    thick, loose = run(Body(air=600.0)), run(Body(air=600.0, play=(1e-3, 1e-3)))
+    assert np.abs(thick - plain)[:, :2].max() > 2e-3
+    assert np.abs(loose - thick).max() < 0.05 * np.abs(thick - plain).max()
+
+
 def test_wheels_that_slide_move_the_robot_the_same_at_half_the_engine_s_step(monkeypatch, plain):
     """Without springs the wheels hop on the floor, and half the step moves the robot by 6 mm in this second."""
     slippery = Body(grip=0.05)
