@@ -83,8 +83,8 @@ def world(body: Body) -> str:
 
 
 def _wheel(body: Body, k: int, side: str) -> str:
-    """A wheel, with its rotor on the same shaft or, with play, beside it; the rotor's inertia is its joint's, for a body
-    that light would stand for a huge box to the air."""
+    """A wheel, with its rotor on the same shaft or, with play, beside it: the rotor's inertia is its joint's, for so
+    light a body with it would be a huge box to the air."""
     place = (-0.5 if side == "r" else 0.5) * body.track
     loose = body.play[k] > 0.0
     on_shaft = 0.0 if loose else body.rotor
