@@ -81,9 +81,9 @@ def diagnose(
     precision and a minute. InputError for logs that say nothing, and for a simulator in other units."""
     require_float64("diagnose")
     check_nominal(logs, sim, model)
-    simulator, values = None if model is None else as_simulator(model, logs), None
-    given = None if simulator is None else simulator.vector[:10]
-    prepared, finding = search(prepare(logs, horizon, given), alone=sim is None)
+    simulator = None if model is None else as_simulator(model, logs)
+    prepared, finding = search(prepare(logs, horizon, None if simulator is None else simulator.vector[:10]))
+    values = None
     if sim is not None:
         simulator, finding, values = inspect_simulator(sim, prepared, finding)
     told = None if simulator is None else simulator.vector

@@ -2,25 +2,24 @@
 
 from jaxident.diagnosis.causes.candidates import ENOUGH, PENALTY, Finding
 from jaxident.diagnosis.causes.lost import find_lost
-from jaxident.diagnosis.causes.which import enlarge, search_effects
+from jaxident.diagnosis.causes.which import search_effects
 from jaxident.diagnosis.prepare import Prepared, repaired
 
 REPAIRS = 2
 """Times that lost commands are looked for: a second time under the noise that the first leaves."""
 
 
-def search(prepared: Prepared, alone: bool = True) -> tuple[Prepared, Finding]:
+def search(prepared: Prepared) -> tuple[Prepared, Finding]:
     """The search, and again with the commands that arrived where saying that some were lost is worth more than the
-    effects found without: a delay, say, makes every change late, lost commands only some. In the end with room for
-    all effects if `alone`; beside another it goes on there."""
+    effects found without: a delay, say, makes every change late, lost commands only some."""
     finding = search_effects(prepared.windows, prepared.naming, prepared.nominal, prepared.law)
     for _ in range(REPAIRS):
         best = finding.candidates[finding.selected]
-        only, beside = (find_lost(finding.data, solution) for solution in (finding.nominal, best.solution))
-        instead = only.gain - best.evidence > beside.gain
-        lost, worth = (only, only.gain - best.evidence) if instead else (beside, beside.gain)
+        alone, beside = (find_lost(finding.data, solution) for solution in (finding.nominal, best.solution))
+        instead = alone.gain - best.evidence > beside.gain
+        lost, worth = (alone, alone.gain - best.evidence) if instead else (beside, beside.gain)
         if worth - PENALTY < ENOUGH:
             break
         prepared = repaired(prepared, lost, worth - PENALTY)
         finding = search_effects(prepared.windows, prepared.naming, prepared.nominal, prepared.law)
-    return prepared, enlarge(finding) if alone else finding
+    return prepared, finding

@@ -100,7 +100,7 @@ def _search(sim: Log | Sequence[Log], prepared: Prepared, finding: Finding) -> t
     own = prepare(sim, None, nominal, prepared, law)
     if is_noisy(first_law(own.windows), finding.law):
         own = prepare(sim, None, nominal, prepared)
-        mended, found = search(own._replace(naming=shows_start(own.windows)), alone=False)
+        mended, found = search(own._replace(naming=shows_start(own.windows)))
         return mended._replace(naming=own.naming), found, True
     return own, search_effects(own.windows, shows_start(own.windows), own.nominal, law, sized=False), False
 

@@ -112,32 +112,3 @@ def test_beside_a_rival_there_is_a_single_effect_left_to_grow_from(exchange, mon
     found = {effects: Candidate(effects, fit(effects), 900.0 - cost) for effects, cost in costs.items()}
     now = which.Search(found, data, None, Law(1.0, 1.0), (FIRST, SECOND))
     assert set(which._beside_rival(now, ()).selected) >= {FIRST, SECOND}
-
-
-@pytest.mark.parametrize(("third", "fifth", "selected"), [(200.0, 300.0, 5), (200.0, 5.0, 4), (5.0, 300.0, 2)])
-def test_a_search_that_has_filled_its_room_gets_more(monkeypatch, third, fifth, selected):
-    """Five effects, the third and the fifth worth something or nothing: a set that stopped short of three stays."""
-    gains = np.cumsum([9000.0, 3000.0, third, 300.0, fifth])
-    effects = (FIRST, SECOND, OTHER, "marker_offset", "slope")
-
-    def fit(own):
-        linear = SimpleNamespace(residual=None)
-        return SimpleNamespace(effects=own, vector=np.zeros(SIZE), starts=None, linear=linear)
-
-    def refit_each(found, data, begin, names, beside):
-        own = effects[: len(beside) + 1]
-        if beside == effects[: len(beside)] and len(beside) < 5:
-            found[own] = Candidate(own, fit(own), gains[len(beside)])
-
-    monkeypatch.setattr(sets, "refit_each", refit_each)
-    monkeypatch.setattr(sets, "scores_of", lambda data, solution, without: {})
-    monkeypatch.setattr(sets, "exchange", lambda found, data, selected, without: selected)
-    monkeypatch.setattr(which, "exchange", sets.exchange)
-    monkeypatch.setattr(which, "respond", lambda *args: None)
-    monkeypatch.setattr(which, "resized", lambda solution, data, responses, law, *rest, **options: law)
-    monkeypatch.setattr(which, "unexplained", lambda data, solution, *rest: ([], Law(1.0, 1.0)))
-    found = {(): Candidate((), fit(()), 0.0)}
-    found |= {effects[:k]: Candidate(effects[:k], fit(effects[:k]), gains[k - 1]) for k in (1, 2, 3)}
-    data = SimpleNamespace(windows=None)
-    before = which._defended(which.Search(found, data, None, Law(1.0, 1.0), effects[: 3 if third > 9.0 else 2]), True)
-    assert which.enlarge(before).selected == effects[:selected]

@@ -15,8 +15,9 @@ from jaxident.diagnosis.motion.coordinates import (
     neutral_vector,
 )
 
-BESIDE = 4
-"""Effects that are refitted beside a set before one is accepted."""
+MOST_EFFECTS, BESIDE = 3, 4
+"""Effects in a set at most where a robot is searched alone, and how many are refitted beside a set before one is
+accepted. With room for six, sets of real robots predicted runs kept for judging no better or worse."""
 
 
 def refit_each(found: dict, data: Data, begin: Solution, names: list[str], beside: tuple[str, ...]) -> None:
@@ -42,9 +43,13 @@ def _refit_with_shapes(data: Data, vector: Array, starts: Array, effects: tuple[
     return refit(data, vector, starts, effects)
 
 
-def grow(found: dict, data: Data, without: Collection[str], selected: tuple[str, ...], most: int) -> tuple[str, ...]:
-    """A set with effects accepted one after the other, each for a joint refit that is worth it."""
-    while len(selected) < most:
+def grow(found: dict, data: Data, without: Collection[str]) -> tuple[str, ...]:
+    """Effects accepted one after the other, each for a joint refit that is worth it."""
+    selected: tuple[str, ...] = ()
+    singles = sorted((c for e, c in found.items() if len(e) == 1), key=lambda c: -c.evidence)
+    if singles and singles[0].evidence > ENOUGH:
+        selected = singles[0].effects
+    while selected and len(selected) < MOST_EFFECTS:
         _one_more(found, data, selected, without)
         more = [c for e, c in found.items() if len(e) == len(selected) + 1]
         best = max(more, key=lambda c: c.evidence, default=None)

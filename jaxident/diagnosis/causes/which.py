@@ -1,4 +1,4 @@
-"""Which effect: scores of all from the nominal fit, full refits of the best, then more beside them, one by one."""
+"""Which effect: scores of all from the nominal fit, full refits of the best, then a second and a third beside it."""
 
 from collections.abc import Collection
 from typing import NamedTuple
@@ -21,9 +21,6 @@ REFITS, KEPT = 6, 4
 best leaves."""
 TAKEN = 0.7
 """Part of some noise that is left beside one more effect where the law before took that effect for noise."""
-FIRST_EFFECTS, MOST_EFFECTS = 3, 6
-"""Effects in a set at most, as long as commands may still be found lost and in the end: a real robot has four or five,
-and what has no room is a term that others must be worth twice."""
 LIKELY = 1.0
 """Gain for which slip enters the law that the gap is held against: a floor without slip that is as likely there as not
 would be too low, and too sure."""
@@ -64,24 +61,6 @@ def search_effects(
     return _defended(now, sized)
 
 
-def enlarge(finding: Finding) -> Finding:
-    """A search gone on with room for MOST_EFFECTS where it had filled what it had."""
-    found, data = dict(finding.candidates), finding.data
-    full, less = (
-        max((c for c in found.values() if len(c.effects) == count), key=lambda c: c.evidence, default=None)
-        for count in (FIRST_EFFECTS, FIRST_EFFECTS - 1)
-    )
-    if full is None or less is None or full.evidence < less.evidence + ENOUGH:
-        return finding
-    selected = exchange(found, data, grow(found, data, (), full.effects, MOST_EFFECTS), ())
-    if len(selected) <= FIRST_EFFECTS:
-        return finding
-    solution = found[selected].solution
-    responses = respond(np.exp(solution.vector[:2]), solution.linear.residual, data.windows)
-    now = Search(found, data, responses, finding.likely, selected)
-    return _defended(_beside_rival(now, (), MOST_EFFECTS), sized=True)
-
-
 def _defended(now: Search, sized: bool) -> Finding:
     """What the set leaves, or a smaller one, if further effects are not worth what is left, unless that would leave so
     much that the gap is unknown; a set that does so itself claims none of its names, and stays as near as it is."""
@@ -100,7 +79,7 @@ def _defended(now: Search, sized: bool) -> Finding:
     return finding if less.unexplained > UNEXPLAINED else less
 
 
-def _beside_rival(now: Search, without: Collection[str], most: int = FIRST_EFFECTS) -> Search:
+def _beside_rival(now: Search, without: Collection[str]) -> Search:
     """The search once more under the noise beside the best set of one effect more, or beside a set of several itself,
     if that is much less: the noise so far had taken the last effect up, and left it too little to gain."""
     rival = _rival(now.found, now.selected) or now.found[now.selected]
@@ -113,15 +92,12 @@ def _beside_rival(now: Search, without: Collection[str], most: int = FIRST_EFFEC
     first = max((effects for effects in now.found if len(effects) == 1), key=lambda e: now.found[e].evidence)
     parts = [effects for effects in now.found if set(effects) <= set(rival.effects)]
     found = _again(now.found, data, [first, *parts])  # else sets alone might be left, and none to grow from
-    return Search(found, data, responses, law, _choose(found, data, without, most))
+    return Search(found, data, responses, law, _choose(found, data, without))
 
 
-def _choose(found: dict, data: Data, without: Collection[str], most: int = FIRST_EFFECTS) -> tuple[str, ...]:
+def _choose(found: dict, data: Data, without: Collection[str]) -> tuple[str, ...]:
     """The set that grows from the best single effect, each of it exchanged where another is better."""
-    best = max((c for c in found.values() if len(c.effects) == 1), key=lambda c: c.evidence, default=None)
-    if best is None or best.evidence <= ENOUGH:
-        return ()
-    return exchange(found, data, grow(found, data, without, best.effects, most), without)
+    return exchange(found, data, grow(found, data, without), without)
 
 
 def resized(solution: Solution, data: Data, responses: Responses, law: Law, sized: bool, worth: float = WORTH) -> Law:
