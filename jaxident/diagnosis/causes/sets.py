@@ -17,8 +17,8 @@ from jaxident.diagnosis.motion.coordinates import (
 
 MOST_EFFECTS, BESIDE = 3, 4
 """Effects in a set at most where a robot is searched alone, and how many are refitted beside a set before one is
-accepted. With room for six, sets of five real robots shrank the gap on runs kept apart by 0.80 on average, with room for
-three by 0.86."""
+accepted. With room for six, sets of five real robots shrank the gap on runs kept apart by 0.80 on average, with room
+for three by 0.86."""
 
 
 def refit_each(found: dict, data: Data, begin: Solution, names: list[str], beside: tuple[str, ...]) -> None:
