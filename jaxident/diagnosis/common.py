@@ -57,6 +57,8 @@ def explain_together(robot: Finding, simulator: Finding) -> Together:
     robot, simulator = _grown(robot, simulator)
     price = max(ENOUGH, TERMS * min(largest(robot.terms), largest(simulator.terms)))
     chosen, partner, values = _pair(robot, simulator, price, (robot.further, simulator.further))
+    both = tuple(name for name in chosen if name not in values[chosen][1])
+    robot = _with_set(robot, both, robot.candidates[chosen], simulator.candidates[partner])  # what the gap begins from
     return Together(_reselected(robot, chosen), _reselected(simulator, partner), values, price)
 
 

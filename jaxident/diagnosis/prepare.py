@@ -1,4 +1,4 @@
-"""From logs to what a diagnosis works on: scaled commands, windows, what each run is for, and frames that lie."""
+"""From logs to what a diagnosis works on: scaled commands, windows, and what each run is for."""
 
 from typing import Any, NamedTuple
 
@@ -9,6 +9,7 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.lost import Lost
 from jaxident.diagnosis.causes.search import Data, Solution, refit
+from jaxident.diagnosis.frames import Frames, blind, find_more_outliers, find_outliers, find_repeats, has_outliers
 from jaxident.diagnosis.motion.coordinates import neutral_vector, nominal_vector
 from jaxident.diagnosis.motion.linear import START_STATES
 from jaxident.diagnosis.motion.responses import respond
@@ -30,18 +31,6 @@ LONGEST, SHORTEST = 60, 20
 """Rows of a horizon where none is asked for: cost grows with their cube, sensitivity with their number."""
 HORIZON = 1.0
 """Horizon [s] where none is asked for."""
-OUTLYING, LESS_OUTLYING = 7.0, 4.5
-"""Standard deviations by which a pose leaves those nearby before it is an outlier; fewer suffice where a log is known
-to have outliers, for not all are large."""
-FEW = 3
-"""Outliers from which on a log is known to have some."""
-
-
-class Frames(NamedTuple):
-    """Poses that are no measurement of their time, boolean (rows of the log,): exact repeats, and outliers."""
-
-    frozen: Any
-    outlying: Any
 
 
 class Prepared(NamedTuple):
@@ -93,7 +82,7 @@ def prepare(
     outlying = find_outliers(log, windows, first)
     if outlying.any():
         windows, naming, first = without_rows(log, outlying, first)
-    if outlying.sum() >= FEW:
+    if has_outliers(outlying):
         outlying |= find_more_outliers(blind(log, outlying), windows, first)
         windows, naming, first = without_rows(log, outlying, first)
     responses = respond(np.exp(first.vector[:2]), first.linear.residual, windows)
@@ -174,69 +163,8 @@ def shows_start(windows: Windows) -> np.ndarray:
     return np.sum(windows.seen[:BURN], axis=0) >= FEWEST
 
 
-def find_repeats(log: Log) -> np.ndarray:
-    """Rows whose pose equals the one before in all three numbers: a camera with noise never measures that."""
-    pose = np.stack([log.x, log.y, log.theta])
-    same = np.concatenate([[False], np.all(pose[:, 1:] == pose[:, :-1], axis=0)])
-    same &= np.concatenate([[False], np.asarray(log.run)[1:] == np.asarray(log.run)[:-1]])
-    noisy = np.mean(same) < 0.3
-    return same & noisy
-
-
-def blind(log: Log, rows: Array) -> Log:
-    """The log without the poses of some rows."""
-    x, y, theta = (np.where(rows, np.nan, column) for column in log.pose)
-    return log._replace(x=x, y=y, theta=theta)
-
-
 def without_rows(log: Log, rows: Array, fit: Solution) -> tuple[Windows, np.ndarray, Solution]:
     """Windows, roles and the nominal fit without the poses of some rows, windows as long as those of a fit."""
     windows = cut(blind(log, rows), fit.linear.residual.shape[1] // 3)
     naming = roles(windows)
     return windows, naming, rough_fit(windows, naming, fit.vector)
-
-
-def find_outliers(log: Log, windows: Windows, solution: Solution) -> np.ndarray:
-    """Rows (of the log) whose residual leaves those of both neighbours, which agree with each other: strict, for what a
-    model misses must not be taken for outliers."""
-    residual = solution.linear.residual.reshape(*np.asarray(windows.step).T.shape, 3)
-    seen = np.asarray(windows.seen).T
-    middle = residual[:, 1:-1] - 0.5 * (residual[:, 2:] + residual[:, :-2])
-    whole = seen[:, 1:-1] & seen[:, 2:] & seen[:, :-2]
-    apart = np.abs(residual[:, 2:] - residual[:, :-2])
-    spread = np.array([np.median(np.abs(middle[..., k][whole])) / 0.6745 if whole.any() else 1.0 for k in range(3)])
-    lonely = (np.abs(middle) > OUTLYING * spread) & (apart < 0.5 * np.abs(middle))
-    window, row = np.nonzero(lonely.any(axis=2) & whole)
-    found = np.zeros(len(log.t), bool)
-    found[_places(log, windows)[window] + row + 1] = True
-    return found
-
-
-def find_more_outliers(log: Log, windows: Windows, solution: Solution) -> np.ndarray:
-    """Rows whose residual leaves those nearby, which mostly agree: smaller outliers, two in a row, and those at the
-    ends of a window; for logs that are known to have some."""
-    residual = solution.linear.residual.reshape(*np.asarray(windows.step).T.shape, 3)
-    rows = [np.flatnonzero(own) for own in np.asarray(windows.seen).T]
-    pairs = [_beside(own[k]) for own, k in zip(residual, rows, strict=True)]
-    apart, near = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
-    spread = np.median(np.abs(apart), axis=0) / 0.6745
-    hit = ((np.abs(apart) > LESS_OUTLYING * spread) & (near < 0.25 * np.abs(apart))).any(axis=1)
-    found = np.zeros(len(log.t), bool)
-    places = _places(log, windows)
-    found[np.concatenate([place + k for place, k in zip(places, rows, strict=True)])[hit]] = True
-    return found
-
-
-def _places(log: Log, windows: Windows) -> np.ndarray:
-    """The row of the log at which each window begins."""
-    begins = np.flatnonzero(np.concatenate([[True], np.asarray(log.run)[1:] != np.asarray(log.run)[:-1]]))
-    return begins[windows.run] + windows.first
-
-
-def _beside(values: Array) -> tuple[np.ndarray, np.ndarray]:
-    """How far each of some values (rows, 3) lies from the median of the five around it, and how far the third nearest
-    of these five does: small where most agree, even if two in a row are wrong."""
-    first = np.clip(np.arange(len(values)) - 2, 0, len(values) - 5)
-    five = values[first[:, None] + np.arange(5)]
-    middle = np.median(five, axis=1)
-    return values - middle, np.sort(np.abs(five - middle[:, None]), axis=1)[:, 2]

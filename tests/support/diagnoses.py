@@ -10,9 +10,10 @@ from jaxident.diagnosis.diagnose import Diagnosis, Gap, Parameter
 from jaxident.diagnosis.extent.floor import Floor
 from jaxident.diagnosis.extent.shrink import Shrink
 from jaxident.diagnosis.extent.where import Place, Region
+from jaxident.diagnosis.frames import Frames
 from jaxident.diagnosis.motion.coordinates import COORDINATES, NOMINAL
 from jaxident.diagnosis.noise.law import Law
-from jaxident.diagnosis.prepare import Frames, Prepared
+from jaxident.diagnosis.prepare import Prepared
 from jaxident.diagnosis.replay import Replay
 from jaxident.diagnosis.verdict import Cause, Judgement
 from jaxident.effects.catalogue import SITES

@@ -2,18 +2,18 @@
 memory."""
 
 from jaxident.diagnosis.causes.candidates import ENOUGH, Finding
+from jaxident.diagnosis.frames import has_outliers
 from jaxident.diagnosis.prepare import Prepared
 
 
 def direct_evidence(prepared: Prepared, finding: Finding, price: float = ENOUGH) -> dict[str, float]:
     """Evidence for effects that are seen in the frames themselves or sized with the noise, claimed above ENOUGH. price:
     what commands that never arrived must be worth, for they too take up what is missing in a model."""
-    rows = len(prepared.log.t)
-    frozen, outlying = int(prepared.frames.frozen.sum()), int(prepared.frames.outlying.sum())
+    frozen, outlying = int(prepared.frames.frozen.sum()), prepared.frames.outlying
     return {
         "frozen_frames": 10.0 * frozen if frozen >= 3 else 0.0,
         # normal noise lies OUTLYING deviations off once in 10^11 rows
-        "outliers": 10.0 * outlying if outlying >= max(3, 1e-4 * rows) else 0.0,
+        "outliers": 10.0 * int(outlying.sum()) if has_outliers(outlying) else 0.0,
         "lost_commands": prepared.lost[1] - (price - ENOUGH),
         "coloured_noise": 2.0 * ENOUGH if finding.law.coloured is not None else 0.0,
     }
