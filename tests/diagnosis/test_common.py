@@ -172,3 +172,19 @@ def test_sets_that_grew_apart_are_tried_in_the_other_s_logs(monkeypatch):
     found = explain_together(robot._replace(nominal=nominal), simulator._replace(nominal=nominal))
     assert set(found.robot.selected) == {"marker_offset", "slope"}
     assert found.missing == ("slope",)
+
+
+def test_what_robot_and_simulator_share_is_refitted_on_its_own(monkeypatch):
+    """The gap is measured from there: without that set among the candidates it would begin from the nominal model."""
+    monkeypatch.setattr(common, "one_more", lambda finding, selected: finding)
+    monkeypatch.setattr(common, "_crossed", lambda finding, own, other, theirs: finding)
+    monkeypatch.setattr(common, "_reselected", lambda finding, selected: finding._replace(selected=selected))
+    monkeypatch.setattr(common, "refit", lambda data, vector, starts, effects: fit(effects, 0.1).solution)
+    shared = ("turn_loss", "transport_delay")
+    robot = search({(*shared, "slope"): 900.0}, (*shared, "slope"))
+    more = (*shared, "heading_offset")
+    simulator = search({more: 500.0}, more)
+    nominal = fit(()).solution
+    found = explain_together(robot._replace(nominal=nominal), simulator._replace(nominal=nominal))
+    assert found.missing == ("slope",)
+    assert shared in found.robot.candidates
