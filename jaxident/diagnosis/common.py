@@ -66,8 +66,11 @@ def _grown(robot: Finding, simulator: Finding) -> tuple[Finding, Finding]:
     """Both with sets of ever more effects, and the pair selected that these lead to if every effect costs ENOUGH."""
     least = ENOUGH, (ENOUGH, ENOUGH)
     chosen, partner, _ = _pair(robot, simulator, *least)
+    before: tuple[tuple[str, ...] | None, tuple[str, ...] | None] = None, None
     for _ in range(ROUNDS):
-        robot, simulator, before = one_more(robot, chosen), one_more(simulator, partner), (chosen, partner)
+        robot = robot if chosen == before[0] else one_more(robot, chosen)
+        simulator = simulator if partner == before[1] else one_more(simulator, partner)
+        before = chosen, partner
         chosen, partner, _ = _pair(robot, simulator, *least)
         if (chosen, partner) == before:
             break

@@ -138,9 +138,10 @@ def test_the_same_effect_of_another_size_is_a_parameter_and_hardly_any_of_it_a_d
 def test_what_an_effect_takes_up_is_not_held_against_it(monkeypatch, together):
     """The robot leaves a term worth 400, and an effect found beside the pair takes all of it for 500: a price of twice
     the term, as it was before, would keep that effect out."""
-    pair = ("turn_loss", "slope")
+    pair, searched = ("turn_loss", "slope"), []
 
     def one_more(finding, selected):
+        searched.append((bool(finding.terms), selected))
         more = fit(pair, 0.1, gain=800.0)
         return finding._replace(candidates=finding.candidates | {pair: more}) if finding.terms else finding
 
@@ -153,6 +154,7 @@ def test_what_an_effect_takes_up_is_not_held_against_it(monkeypatch, together):
     found = together(robot, simulator._replace(selected=("turn_loss",)))
     assert found.robot.selected == pair
     assert found.missing == ("slope",)
+    assert len(set(searched)) == len(searched) == 3, "the robot beside both its sets, the simulator beside one"
 
 
 def test_sets_that_grew_apart_are_tried_in_the_other_s_logs(monkeypatch):

@@ -234,14 +234,19 @@ def test_outliers_are_found_large_ones_first(plain):
 
 
 def test_where_misses_are_smooth_hardly_a_row_is_an_outlier(plain):
-    """Random walks under a hundredth of their steps in noise: most rows are the median of the five around them, so that
-    a spread by the median of what is left is next to nothing. On a real robot 747 of 8,838 rows lay beyond it."""
+    """Sums of random walks, with a hundredth of their steps in noise: most rows are the median of the five around them,
+    so that a spread by the median of what is left is next to nothing, and twice as many rows lie beyond it (0.012 to
+    0.018 of all, 0.005 to 0.007 by its tail; means of twenty such logs). On a real robot 747 of 8,838 did."""
     data, nominal = plain
     log = SimpleNamespace(t=np.zeros(RUNS * ROWS), run=np.repeat(np.arange(RUNS), ROWS))
     rng, shape = np.random.default_rng(2), (len(data.windows.run), len(nominal.linear.residual[0]) // 3, 3)
-    residual = np.cumsum(np.cumsum(rng.normal(size=shape), axis=1), axis=1) + 0.01 * rng.normal(size=shape)
-    fit = nominal._replace(linear=nominal.linear._replace(residual=residual.reshape(shape[0], -1)))
-    assert find_more_outliers(log, data.windows, fit).mean() < 0.01
+
+    def share():
+        walks = np.cumsum(np.cumsum(rng.normal(size=shape), axis=1), axis=1) + 0.01 * rng.normal(size=shape)
+        fit = nominal._replace(linear=nominal.linear._replace(residual=walks.reshape(shape[0], -1)))
+        return find_more_outliers(log, data.windows, fit).mean()
+
+    assert np.mean([share() for _ in range(20)]) < 0.009
 
 
 def test_one_outlier_in_two_thousand_rows_makes_no_log_with_outliers():
