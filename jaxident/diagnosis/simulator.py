@@ -79,18 +79,29 @@ def inspect_simulator(
     together = explain_together(finding, found)
     fit = together.simulator.candidates[together.simulator.selected]
     shared_effects = tuple(name for name in fit.effects if name not in together.missing)
-    direct = tuple(name for name, worth in direct_evidence(own, found).items() if worth > ENOUGH)
-    rare = rarer(direct_effects(own, found, direct), direct_effects(prepared, finding, direct))
-    effects = (*shared_effects, *(name for name in direct if name not in rare))
+    effects = (*shared_effects, *_direct((own, found), (prepared, finding), together.price))
     excess = _excess(own, together.simulator) if noisy else 0.0
     simulator = Simulator(fit.solution.vector, effects, together.simulator, together.price, excess)
     return simulator, together.robot, together.values
 
 
-def rarer(theirs: dict[str, dict[str, float]], own: dict[str, dict[str, float]]) -> list[str]:
-    """Effects of chance that a simulator has hardly any of: most of the robot's share of rows is missing there."""
+def _direct(sim: tuple[Prepared, Finding], robot: tuple[Prepared, Finding], price: float) -> list[str]:
+    """Effects that show without a refit and that a simulator has as well, by both sides' logs and searches."""
+    worth = {name: value for name, value in direct_evidence(*sim).items() if value > ENOUGH}
+    theirs, own = (direct_effects(*side, tuple(worth)) for side in (sim, robot))
+    scale = len(robot[0].log.t) / max(len(sim[0].log.t), 1)
+    beyond = {name: value - scale * worth.get(name, 0.0) for name, value in direct_evidence(*robot).items()}
+    return [name for name in worth if name not in rarer(theirs, own, beyond, price)]
+
+
+def rarer(
+    theirs: dict[str, dict[str, float]], own: dict[str, dict[str, float]], beyond: dict[str, float], price: float
+) -> list[str]:
+    """Effects of chance that a simulator has hardly any of: most of the robot's share of rows is missing there, and
+    what its rows are worth `beyond` the simulator's is more than the price of a difference."""
     shares = {name: values["probability"] for name, values in own.items() if "probability" in values}
-    return [name for name, share in shares.items() if theirs[name]["probability"] < (1.0 - MOSTLY) * share]
+    fewer = [name for name, share in shares.items() if theirs[name]["probability"] < (1.0 - MOSTLY) * share]
+    return [name for name in fewer if beyond[name] > price]
 
 
 def _search(sim: Log | Sequence[Log], prepared: Prepared, finding: Finding) -> tuple[Prepared, Finding, bool]:

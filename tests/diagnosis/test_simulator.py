@@ -104,8 +104,10 @@ def test_what_the_simulator_has_hardly_any_of_is_rarer_there():
         "frozen_frames": {"probability": 0.08},
         "coloured_noise": {"position": 2.0},
     }
-    assert rarer(theirs, own) == ["outliers"]
-    assert rarer(theirs, {}) == []
+    beyond = {"outliers": 30.0, "frozen_frames": 30.0, "coloured_noise": 30.0}
+    assert rarer(theirs, own, beyond, price=9.0) == ["outliers"]
+    assert rarer(theirs, own, beyond, price=40.0) == []  # as much is made up easily where something is missing
+    assert rarer(theirs, {}, beyond, price=9.0) == []
 
 
 def test_a_model_that_knows_the_side_of_its_marker_is_compared_as_seen_from_there():
