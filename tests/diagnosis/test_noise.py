@@ -7,7 +7,7 @@ from support.arcs import along_arcs
 from jaxident.diagnosis.motion.responses import answer_to_start, respond
 from jaxident.diagnosis.noise.doubt import MEMORIES, doubt_of, draw_laws, sizes_by_memory
 from jaxident.diagnosis.noise.law import Law, covariance, first_law, is_quieter, white_whitener, whitener_of
-from jaxident.diagnosis.noise.sizing import sample, size_noise, size_one
+from jaxident.diagnosis.noise.sizing import sample, size_noise, size_one, steady_gain
 
 ROWS, COUNT = 45, 60
 RATES = np.array([4.0, 5.0])
@@ -90,6 +90,23 @@ def test_camera_memory_is_not_taken_for_slip(made):
     found = sized(law, made, 4)
     assert found.coloured is not None
     np.testing.assert_allclose(found.coloured, law.coloured, rtol=0.4)
+
+
+@pytest.mark.parametrize(("share", "size", "claimed"), [(1.0, 1.0, True), (0.08, 4.0, False)])
+def test_a_memory_is_the_cameras_where_most_windows_show_it(made, share, size, claimed):
+    """Six draws: errors with a memory in all windows, and larger ones in five of sixty, as where wheels slide."""
+    windows, responses, starts = made
+    use = np.ones(COUNT, bool)
+    kinds = (Law(5e-4, 4e-3), Law(5e-4, 4e-3, coloured=(1e-3 * size, 8e-3 * size), coloured_time=0.5))
+    white, slow = (np.linalg.cholesky(covariance(law, windows, responses)) for law in kinds)
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        factor = np.where((rng.permutation(COUNT) < share * COUNT)[:, None, None], slow, white)
+        noise = (factor @ rng.normal(size=(COUNT, 3 * ROWS, 1)))[..., 0]
+        measured = windows._replace(pose=windows.pose + noise.reshape(COUNT, ROWS, 3).transpose(1, 0, 2))
+        law = size_noise(noise, starts, measured, responses, use)
+        assert law.coloured is not None
+        assert (steady_gain(noise, starts, measured, responses, use, law) > 0.0) == claimed
 
 
 def test_a_rest_of_strong_slip_is_no_camera_memory(made):

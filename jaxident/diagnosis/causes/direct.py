@@ -1,8 +1,12 @@
 """Effects that show without a refit: commands that never arrived, frames that repeat, outliers, a camera error with a
 memory."""
 
+import numpy as np
+
 from jaxident.diagnosis.causes.candidates import ENOUGH, Finding
 from jaxident.diagnosis.frames import has_outliers
+from jaxident.diagnosis.motion.responses import respond
+from jaxident.diagnosis.noise.sizing import steady_gain
 from jaxident.diagnosis.prepare import Prepared
 
 
@@ -15,8 +19,17 @@ def direct_evidence(prepared: Prepared, finding: Finding, price: float = ENOUGH)
         # normal noise lies OUTLYING deviations off once in 10^11 rows
         "outliers": 10.0 * int(outlying.sum()) if has_outliers(outlying) else 0.0,
         "lost_commands": prepared.lost[1] - (price - ENOUGH),
-        "coloured_noise": 2.0 * ENOUGH if finding.law.coloured is not None else 0.0,
+        "coloured_noise": _memory(finding) if finding.law.coloured is not None else 0.0,
     }
+
+
+def _memory(finding: Finding) -> float:
+    """Evidence for a memory of the camera; beside others it pays what a further effect does."""
+    data, solution = finding.data, finding.candidates[finding.selected].solution
+    responses = respond(np.exp(solution.vector[:2]), solution.linear.residual, data.windows)
+    linear, law = solution.linear, finding.law
+    gain = steady_gain(linear.residual, linear.starts, data.windows, responses, data.use, law)
+    return gain - (finding.further - ENOUGH if finding.selected else 0.0)
 
 
 def direct_effects(prepared: Prepared, finding: Finding, selected) -> dict[str, dict[str, float]]:
