@@ -13,6 +13,7 @@ COUNTS = {
     "development_pairs": {"pair": 15, "outside": 15},
     "forms": {"single": 46, "pair": 30},
     "sealed": {"none": 80, "single": 145, "pair": 40, "outside": 40},
+    "sealed_half": {"none": 40, "single": 73, "pair": 20, "outside": 20},
     "engine": {"none": 5, "single": 15},
     "sealed_engine": {"none": 20, "single": 60, "pair": 20},
 }
@@ -59,7 +60,7 @@ def _batch_cases(rng, name: str) -> list[dict]:
         for number, names in enumerate(hidden_names(rng, kind, count, pool)):
             sim = rng.choice(["same", "near"]) if rng.random() < 1 / 3 else None
             slip = number % 2 == 1 if kind == "none" else rng.random() < 0.5
-            forward = name == "sealed" and rng.random() < FORWARD
+            forward = name.startswith("sealed") and rng.random() < FORWARD
             inputs = "forward" if forward else "multilevel"
             own = int(rng.integers(2**62))
             cases.append(describe(own, kind, names, slip=bool(slip), sim=sim, inputs=inputs, other=name == "forms"))
