@@ -85,6 +85,18 @@ def test_slip_is_found_and_sized(made):
     assert found.coloured is None
 
 
+def test_slip_without_any_camera_error_leaves_a_law_that_whitens(made):
+    windows, responses, starts = made
+    law = Law(1e-9, 1e-9, (0.1, 0.4), 0.8)
+    unit = np.random.default_rng(7).normal(size=(COUNT, 3 * ROWS, 1))
+    residual = (np.linalg.cholesky(covariance(law, windows, responses)) @ unit)[..., 0]
+    given = sample(residual, starts, windows, responses, np.ones(COUNT, bool))
+    found = size_one(given, Law(5e-4, 4e-3), 0.8, None).law
+    white = whitener_of(found, windows, responses)
+    whitened = white @ covariance(found, windows, responses) @ white.transpose(0, 2, 1)
+    np.testing.assert_allclose(whitened, np.broadcast_to(np.eye(3 * ROWS), whitened.shape), atol=1e-4)
+
+
 def test_camera_memory_is_not_taken_for_slip(made):
     law = Law(3e-4, 3e-3, coloured=(1e-3, 1e-2), coloured_time=0.5)
     found = sized(law, made, 4)

@@ -34,6 +34,10 @@ a camera's error is there all the time, what a model misses where grip ends is n
 five robots with such a memory, and less than nothing on four whose wheels slide or have play."""
 
 
+LEAST = 1e-4
+"""Part of the residuals' size that is white at least: without any the covariance of slip has no inverse."""
+
+
 class Sample(NamedTuple):
     """Some windows and some numbers of each: residuals (windows, n), derivatives by start states (windows, n, 5), the
     windows and their responses, whole, and which numbers (windows, n) these are."""
@@ -134,21 +138,26 @@ def size_one(
     given: Sample, begin: Law, slip_time: float | None, coloured_time: float | None, rival: float = -np.inf
 ) -> Sized:
     """The best variances of one structure, or poorer ones if it is far from beating a rival's log-likelihood."""
-    residual, starts, windows, responses, numbers = given
+    residual, _, windows, responses, numbers = given
     parts = parts_of(slip_time, coloured_time, windows, responses, numbers)
     size = variances_of(begin)
     if len(size) < len(parts):  # as much as the camera's variance at the poses
         means = [float(np.mean(np.diagonal(part, axis1=1, axis2=2))) for part in parts[2:]]
         size = np.array([*size[:2], *(size[0] / max(mean, 1e-300) for mean in means)])
-    theta, value = _search(residual, starts, parts, size, of_unseen(windows, numbers), rival)
+    least = np.zeros(len(parts))
+    least[:2] = [LEAST**2 * np.mean(residual[own] ** 2) for own in (numbers % 3 < 2, numbers % 3 == 2)]
+    theta, value = _search(given, parts, np.maximum(size, least), least, rival)
     sd = np.sqrt(theta)
     slip = (float(sd[2]), float(sd[3])) if slip_time is not None else None
     coloured = (float(sd[-2]), float(sd[-1])) if coloured_time is not None else None
     return Sized(Law(float(sd[0]), float(sd[1]), slip, slip_time, coloured, coloured_time), value)
 
 
-def _search(residual: Array, starts: Array, parts, theta: Array, alone: Array, rival: float):
-    """Variances of the highest restricted likelihood, and that likelihood; without hope against a rival it stops."""
+def _search(given: Sample, parts, theta: Array, least: Array, rival: float):
+    """Variances of the highest restricted likelihood, none below `least` (variances,), and that likelihood; without
+    hope against a rival it stops."""
+    residual, starts, windows, _, numbers = given
+    alone = of_unseen(windows, numbers)
     damping, best, value, slope, curve = 1e-3, theta, -np.inf, None, None
     proposed = theta
     for _ in range(MOST_STEPS):
@@ -163,7 +172,7 @@ def _search(residual: Array, starts: Array, parts, theta: Array, alone: Array, r
         # in logarithms of the variances
         gradient, matrix = best * slope, best[:, None] * curve * best
         matrix = matrix + (damping + 1e-9) * np.diag(np.diagonal(matrix) + 1e-3)
-        proposed = best * np.exp(np.clip(np.linalg.solve(matrix, gradient), -3.0, 3.0))
+        proposed = np.maximum(best * np.exp(np.clip(np.linalg.solve(matrix, gradient), -3.0, 3.0)), least)
     return best, float(value)
 
 
