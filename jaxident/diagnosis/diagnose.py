@@ -11,7 +11,7 @@ from jaxident.diagnosis.extent.measure import Gap, measure
 from jaxident.diagnosis.extent.shrink import Shrink
 from jaxident.diagnosis.extent.where import Place
 from jaxident.diagnosis.motion.coordinates import ASIDE, PLACES
-from jaxident.diagnosis.prepare import Prepared, prepare, shows_start
+from jaxident.diagnosis.prepare import Prepared, prepare
 from jaxident.diagnosis.repair import search
 from jaxident.diagnosis.replay import Replay, answers, replay, visible
 from jaxident.diagnosis.simulator import Simulator, as_simulator, check_units, inspect_simulator, shared
@@ -138,8 +138,7 @@ def _finite(value: float) -> float | None:
 
 def decide(prepared: Prepared, judgement: Judgement, parameters: list[Parameter]) -> str:
     """The verdict."""
-    judging = shows_start(prepared.windows) & ~prepared.naming
-    if prepared.naming.sum() < FEW or judging.sum() < FEWEST:
+    if prepared.naming.sum() < FEW or (~prepared.naming).sum() < FEWEST:
         return "undecided"
     if judgement.unknown > 0.5:
         return "unknown"

@@ -13,7 +13,7 @@ from jaxident.diagnosis.frames import Frames, blind, find_more_outliers, find_ou
 from jaxident.diagnosis.motion.coordinates import neutral_vector, nominal_vector
 from jaxident.diagnosis.motion.linear import START_STATES
 from jaxident.diagnosis.motion.responses import respond
-from jaxident.diagnosis.motion.windows import Windows, cut
+from jaxident.diagnosis.motion.windows import Windows, cut, take
 from jaxident.diagnosis.noise.law import Law, first_law, white_whitener
 from jaxident.diagnosis.noise.sizing import size_noise
 from jaxident.errors import InputError
@@ -66,10 +66,8 @@ def prepare(
     log = blind(log, frozen)
     period = float(np.median(np.concatenate([np.diff(run.t) for run in log.runs()])))
     rows, horizon = horizon_rows(horizon, period)
-    windows = cut(log, BURN + rows)
+    windows = stretches(log, BURN + rows)
     naming = roles(windows)
-    if not shows_start(windows).any():
-        raise InputError(f"no stretch of {BURN + rows} rows has {FEWEST} poses among its first {BURN}")
     if not naming.any() or naming.all():
         raise InputError(
             f"{len(log.t)} rows make {len(naming)} windows of {BURN + rows} rows: too few to name and to judge; "
@@ -151,11 +149,20 @@ def first_starts(windows: Windows) -> np.ndarray:
 def roles(windows: Windows) -> np.ndarray:
     """Windows that name, boolean (windows,); the others, every third run from the second on, only judge the gap.
 
-    Of one or two runs it is stretches of four windows, so that both purposes see early and late. Windows that do not
-    show their start name nothing: a speed of a second ago is a guess, and one guess far off bends a whole fit.
+    Of one or two runs it is stretches of four windows, so that both purposes see early and late.
     """
     order = windows.run if len(np.unique(windows.run)) >= 3 else np.arange(len(windows.run)) // 2
-    return (order % 3 != 1) & shows_start(windows)
+    return order % 3 != 1
+
+
+def stretches(log: Log, rows: int) -> Windows:
+    """Windows of some rows that show their start. Where a second without poses comes first, the speed before is a
+    guess: one far off bends a whole fit, or leaves what no number can hold. InputError where there are none."""
+    windows = cut(log, rows)
+    shown = np.flatnonzero(shows_start(windows))
+    if not len(shown):
+        raise InputError(f"no stretch of {rows} rows has {FEWEST} poses among its first {BURN}")
+    return take(windows, shown)
 
 
 def shows_start(windows: Windows) -> np.ndarray:
@@ -165,6 +172,6 @@ def shows_start(windows: Windows) -> np.ndarray:
 
 def without_rows(log: Log, rows: Array, fit: Solution) -> tuple[Windows, np.ndarray, Solution]:
     """Windows, roles and the nominal fit without the poses of some rows, windows as long as those of a fit."""
-    windows = cut(blind(log, rows), fit.linear.residual.shape[1] // 3)
+    windows = stretches(blind(log, rows), fit.linear.residual.shape[1] // 3)
     naming = roles(windows)
     return windows, naming, rough_fit(windows, naming, fit.vector)

@@ -11,7 +11,7 @@ from jaxident.diagnosis.causes.which import search_effects
 from jaxident.diagnosis.common import MOSTLY, Values, explain_together
 from jaxident.diagnosis.extent.measure import measure
 from jaxident.diagnosis.noise.law import Law, deviations, first_law
-from jaxident.diagnosis.prepare import Prepared, prepare, shows_start
+from jaxident.diagnosis.prepare import Prepared, prepare
 from jaxident.diagnosis.repair import search
 from jaxident.diagnosis.translate import to_coordinates
 from jaxident.effects.checks import check_effects
@@ -111,9 +111,9 @@ def _search(sim: Log | Sequence[Log], prepared: Prepared, finding: Finding) -> t
     own = prepare(sim, None, nominal, prepared, law)
     if is_noisy(first_law(own.windows), finding.law):
         own = prepare(sim, None, nominal, prepared)
-        mended, found = search(own._replace(naming=shows_start(own.windows)))
+        mended, found = search(own._replace(naming=np.ones(len(own.naming), bool)))
         return mended._replace(naming=own.naming), found, True
-    return own, search_effects(own.windows, shows_start(own.windows), own.nominal, law, sized=False), False
+    return own, search_effects(own.windows, np.ones(len(own.naming), bool), own.nominal, law, sized=False), False
 
 
 def is_noisy(white: Law, robot: Law) -> bool:

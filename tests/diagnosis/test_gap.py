@@ -10,8 +10,9 @@ from jaxident.diagnosis.extent.measure import judging_windows
 from jaxident.diagnosis.extent.shrink import interval, shrink_of
 from jaxident.diagnosis.extent.where import Region, _discoveries, _regions, increments
 from jaxident.diagnosis.motion.responses import modelled_path
-from jaxident.diagnosis.prepare import BURN, FEWEST, Prepared, roles
+from jaxident.diagnosis.prepare import BURN, FEWEST, Prepared, roles, stretches
 from jaxident.errors import InputError
+from jaxident.log import make_log
 
 COUNT = 90
 NOTHING = np.zeros(400)
@@ -180,12 +181,17 @@ def test_a_turned_marker_looks_like_sideways_movement():
 
 
 @pytest.mark.parametrize("runs", [1, 4])
-def test_windows_that_do_not_show_their_start_name_nothing(runs):
-    windows = along_arcs(40, 24)
-    windows = windows._replace(run=np.arange(24) % runs)
-    plain = roles(windows)
-    hidden = np.array(windows.seen)
-    hidden[: BURN + 1 - FEWEST, ::5] = False
-    hidden[: BURN - FEWEST, ::4] = False
-    assert 0 < plain.sum() < 24
-    np.testing.assert_array_equal(roles(windows._replace(seen=hidden)), plain & (np.arange(24) % 5 > 0))
+def test_windows_that_do_not_show_their_start_take_no_part(runs):
+    """Of 24 windows every fifth has a pose too few among its first rows, every fourth just enough; no log none."""
+    rows, count = 40, 24
+    x = np.zeros((count, rows))
+    x[::4, : BURN - FEWEST] = np.nan
+    x[::5, : BURN + 1 - FEWEST] = np.nan
+    t = 0.03 * np.arange(rows * count)
+    log = make_log(t, t, t, x.ravel(), 0.0 * t, 0.0 * t)._replace(run=np.repeat(np.arange(runs), rows * count // runs))
+    windows = stretches(log, rows)
+    assert len(windows.run) == np.sum(np.arange(count) % 5 > 0)
+    assert windows.seen[:BURN].sum(axis=0).min() == FEWEST
+    assert 0 < roles(windows).sum() < len(windows.run)
+    with pytest.raises(InputError, match="poses among its first"):
+        stretches(log._replace(x=np.full(len(t), np.nan)), rows)

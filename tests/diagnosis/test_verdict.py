@@ -10,7 +10,6 @@ from jaxident.diagnosis.causes.candidates import Candidate
 from jaxident.diagnosis.causes.corrector import Term
 from jaxident.diagnosis.diagnose import decide
 from jaxident.diagnosis.noise.law import Law
-from jaxident.diagnosis.prepare import BURN, FEWEST
 from jaxident.diagnosis.simulator import Simulator
 from jaxident.diagnosis.verdict import alike, judge, slip_of_drive, unknown_probability
 
@@ -148,16 +147,12 @@ def test_what_the_simulator_leaves_unexplained_too_is_no_difference():
     assert unknown_probability(robot, GAP, Simulator(np.zeros(3), (), both(0.01, 400.0))) > 0.95, "slip"
 
 
-def test_stretches_that_do_not_show_their_start_judge_nothing():
-    """Nine windows name and six are kept for judging: without poses in their first rows nothing is decided."""
+def test_one_stretch_kept_for_judging_decides_nothing():
     found = made_up("effects")
-    seen = np.ones((2 * BURN, 15), bool)
 
-    def verdict():
-        naming = np.arange(15) < 9
-        prepared = found.prepared._replace(windows=SimpleNamespace(seen=seen), naming=naming)
+    def verdict(names):
+        prepared = found.prepared._replace(naming=np.arange(15) < names)
         return decide(prepared, found.judgement, found.parameters)
 
-    assert verdict() == "effects"
-    seen[FEWEST - 1 : BURN, 9:] = False
-    assert verdict() == "undecided"
+    assert verdict(9) == "effects"
+    assert verdict(14) == "undecided"

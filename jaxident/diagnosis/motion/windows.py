@@ -69,3 +69,11 @@ def uncut(commands: Array, period: float) -> Windows:
         t=t, session=np.zeros(count), command=np.asarray(commands).transpose(1, 0, 2), step=np.full(t.shape, period),
         pose=np.zeros((*t.shape, 3)), seen=np.ones(t.shape, bool), run=np.arange(count), first=np.zeros(count, int),
     )  # fmt: skip
+
+
+def take(windows: Windows, chosen: Array) -> Windows:
+    """Some of the windows; the runs stay whole."""
+    return windows._replace(
+        step=windows.step[:, chosen], pose=windows.pose[:, chosen], seen=windows.seen[:, chosen],
+        run=windows.run[chosen], first=windows.first[chosen],
+    )  # fmt: skip

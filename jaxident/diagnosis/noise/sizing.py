@@ -11,7 +11,7 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.motion.responses import Responses
-from jaxident.diagnosis.motion.windows import Windows
+from jaxident.diagnosis.motion.windows import Windows, take
 from jaxident.diagnosis.noise.law import Law, first_law, numbers_of, of_unseen, parts_of, variances_of
 
 MOST_STEPS = 12
@@ -124,14 +124,6 @@ def _rows_seen(seen: Array, count: int) -> np.ndarray:
     order = np.argsort(~seen.T, axis=1, kind="stable")
     found, place = seen.sum(axis=0)[:, None], np.arange(count)
     return np.sort(np.take_along_axis(order, np.where(found >= count, place * found // count, place), axis=1), axis=1)
-
-
-def take(windows: Windows, chosen: Array) -> Windows:
-    """Some of the windows; the runs stay whole."""
-    return windows._replace(
-        step=windows.step[:, chosen], pose=windows.pose[:, chosen], seen=windows.seen[:, chosen],
-        run=windows.run[chosen], first=windows.first[chosen],
-    )  # fmt: skip
 
 
 def size_one(
