@@ -19,6 +19,7 @@ from jaxident.errors import InputError
 from jaxident.log import Log, join
 from jaxident.robot.model import Model
 
+MEMORY = "coloured_noise"
 STRIDE = 10
 """Rows over which speeds are taken: camera noise hardly counts."""
 NOISY = 0.5
@@ -86,8 +87,10 @@ def inspect_simulator(
 
 
 def _direct(sim: tuple[Prepared, Finding], robot: tuple[Prepared, Finding], price: float) -> list[str]:
-    """Effects that show without a refit and that a simulator has as well, by both sides' logs and searches."""
-    worth = {name: value for name, value in direct_evidence(*sim).items() if value > ENOUGH}
+    """Effects that show without a refit and that a simulator has as well, by both sides' logs and searches. A memory of
+    its camera counts however few windows show it: what looks like one in both is no difference."""
+    found = direct_evidence(*sim)
+    worth = {name: value for name, value in found.items() if value > ENOUGH or (name == MEMORY and sim[1].law.coloured)}
     theirs, own = (direct_effects(*side, tuple(worth)) for side in (sim, robot))
     scale = len(robot[0].log.t) / max(len(sim[0].log.t), 1)
     beyond = {name: value - scale * worth.get(name, 0.0) for name, value in direct_evidence(*robot).items()}

@@ -5,10 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from jaxident.diagnosis.causes import direct
 from jaxident.diagnosis.diagnose import compare_parameters
+from jaxident.diagnosis.frames import Frames
 from jaxident.diagnosis.motion.coordinates import PLACES, free_places, neutral_vector
 from jaxident.diagnosis.noise.law import Law
-from jaxident.diagnosis.simulator import Simulator, as_simulator, check_units, is_noisy, rarer, shared
+from jaxident.diagnosis.simulator import Simulator, _direct, as_simulator, check_units, is_noisy, rarer, shared
 from jaxident.diagnosis.translate import abreast_of_marker
 from jaxident.errors import InputError
 from jaxident.log import make_log
@@ -108,6 +110,20 @@ def test_what_the_simulator_has_hardly_any_of_is_rarer_there():
     assert rarer(theirs, own, beyond, price=9.0) == ["outliers"]
     assert rarer(theirs, own, beyond, price=40.0) == []  # as much is made up easily where something is missing
     assert rarer(theirs, {}, beyond, price=9.0) == []
+
+
+def test_what_looks_like_a_memory_in_both_cameras_is_no_difference(monkeypatch):
+    """Few windows show the simulator's, so that it alone is none; of a simulator without any it is the robot's."""
+    rows = np.zeros(100)
+    prepared = SimpleNamespace(log=SimpleNamespace(t=rows), frames=Frames(rows > 0, rows > 0), lost=(0.0, 0.0))
+
+    def side(coloured):
+        law = Law(1e-3, 1e-2, coloured=coloured, coloured_time=0.5 if coloured else None)
+        return prepared, SimpleNamespace(law=law)
+
+    monkeypatch.setattr(direct, "_memory", lambda finding, price: 0.0)
+    assert _direct(side((1e-3, 1e-2)), side((1e-3, 1e-2)), 9.0) == ["coloured_noise"]
+    assert _direct(side(None), side((1e-3, 1e-2)), 9.0) == []
 
 
 def test_a_model_that_knows_the_side_of_its_marker_is_compared_as_seen_from_there():

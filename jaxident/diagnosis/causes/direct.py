@@ -12,24 +12,24 @@ from jaxident.diagnosis.prepare import Prepared
 
 def direct_evidence(prepared: Prepared, finding: Finding, price: float = ENOUGH) -> dict[str, float]:
     """Evidence for effects that are seen in the frames themselves or sized with the noise, claimed above ENOUGH. price:
-    what commands that never arrived must be worth, for they too take up what is missing in a model."""
+    what commands that never arrived and a memory must be worth, for they too take up what is missing in a model."""
     frozen, outlying = int(prepared.frames.frozen.sum()), prepared.frames.outlying
     return {
         "frozen_frames": 10.0 * frozen if frozen >= 3 else 0.0,
         # normal noise lies OUTLYING deviations off once in 10^11 rows
         "outliers": 10.0 * int(outlying.sum()) if has_outliers(outlying) else 0.0,
         "lost_commands": prepared.lost[1] - (price - ENOUGH),
-        "coloured_noise": _memory(finding) if finding.law.coloured is not None else 0.0,
+        "coloured_noise": _memory(finding, price) if finding.law.coloured is not None else 0.0,
     }
 
 
-def _memory(finding: Finding) -> float:
+def _memory(finding: Finding, price: float) -> float:
     """Evidence for a memory of the camera; beside others it pays what a further effect does."""
     data, solution = finding.data, finding.candidates[finding.selected].solution
     responses = respond(np.exp(solution.vector[:2]), solution.linear.residual, data.windows)
     linear, law = solution.linear, finding.law
     gain = steady_gain(linear.residual, linear.starts, data.windows, responses, data.use, law)
-    return gain - (finding.further - ENOUGH if finding.selected else 0.0)
+    return gain - (max(price, finding.further if finding.selected else ENOUGH) - ENOUGH)
 
 
 def direct_effects(prepared: Prepared, finding: Finding, selected) -> dict[str, dict[str, float]]:
