@@ -36,7 +36,8 @@ HORIZON = 1.0
 class Prepared(NamedTuple):
     """The log with commands over `largest`; windows; which of them name, boolean (windows,), the others only judge the
     gap; horizon [s] and its rows; the nominal fit and noise law from the windows that name; the share of commands that
-    never arrived, and the gain of saying so: commands are those that did."""
+    never arrived, and the gain of saying so: commands are those that did, those `sent` (rows of a run, runs, 2) are
+    kept beside them."""
 
     log: Log
     largest: float
@@ -47,6 +48,7 @@ class Prepared(NamedTuple):
     nominal: Solution
     law: Law
     lost: tuple[float, float] = (0.0, 0.0)
+    sent: Any = None
 
 
 def prepare(
@@ -95,7 +97,8 @@ def repaired(prepared: Prepared, lost: Lost, worth: float) -> Prepared:
     log = log._replace(u_r=arrived[:, 0], u_l=arrived[:, 1])
     windows = prepared.windows._replace(command=lost.arrived)
     share, gain = prepared.lost
-    return prepared._replace(log=log, windows=windows, lost=(share + lost.share, gain + worth))
+    sent = prepared.windows.command if prepared.sent is None else prepared.sent
+    return prepared._replace(log=log, windows=windows, lost=(share + lost.share, gain + worth), sent=sent)
 
 
 def horizon_rows(horizon: float | None, period: float) -> tuple[int, float]:

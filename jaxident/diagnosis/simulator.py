@@ -7,6 +7,8 @@ import numpy as np
 
 from jaxident.diagnosis.causes.candidates import ENOUGH, Finding
 from jaxident.diagnosis.causes.direct import direct_effects, direct_evidence
+from jaxident.diagnosis.causes.lost import gain_beyond
+from jaxident.diagnosis.causes.search import refit
 from jaxident.diagnosis.causes.which import search_effects
 from jaxident.diagnosis.common import MOSTLY, Values, explain_together
 from jaxident.diagnosis.extent.measure import measure
@@ -94,7 +96,17 @@ def _direct(sim: tuple[Prepared, Finding], robot: tuple[Prepared, Finding], pric
     theirs, own = (direct_effects(*side, tuple(worth)) for side in (sim, robot))
     scale = len(robot[0].log.t) / max(len(sim[0].log.t), 1)
     beyond = {name: value - scale * worth.get(name, 0.0) for name, value in direct_evidence(*robot).items()}
+    if "lost_commands" in worth and robot[0].lost[0] > 0.0:
+        beyond["lost_commands"] = _lost_beyond(*robot, sim[0].lost[0])
     return [name for name in worth if name not in rarer(theirs, own, beyond, price)]
+
+
+def _lost_beyond(prepared: Prepared, finding: Finding, share: float) -> float:
+    """What the robot's own share of lost commands explains beyond what the simulator's does. Even a small one lets in
+    every change that was late beyond doubt; what these are worth is no difference."""
+    fit = finding.candidates[finding.selected]
+    data = finding.data._replace(windows=finding.data.windows._replace(command=prepared.sent))
+    return gain_beyond(data, refit(data, fit.solution.vector, fit.solution.starts, fit.effects), share)
 
 
 def rarer(

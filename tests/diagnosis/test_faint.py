@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from jaxident.diagnosis.causes.lost import find_lost
+from jaxident.diagnosis.causes.lost import find_lost, gain_beyond
 from jaxident.diagnosis.causes.rhythm import _travels, rhythms
 from jaxident.diagnosis.causes.scores import INSTANT, at_best, beginnings
 from jaxident.diagnosis.causes.scores import STEP as STEP_OF
@@ -138,6 +138,16 @@ def test_commands_that_came_late_are_found_one_by_one(plain):
     assert np.mean(moved[true]) > 0.5  # small changes cannot be told
     assert np.mean(moved[~true]) < 0.05  # a fit bent by late changes takes some others for late
     assert find_lost(*plain).gain < 4.0
+
+
+def test_a_share_of_late_commands_is_held_against_another_one():
+    """A smaller share pays more for every change that came late and less for every one that did not; what was late
+    beyond doubt is explained by either."""
+    data, nominal = nominal_fit(windows_of(VECTOR, late=2))
+    found = find_lost(data, nominal)
+    assert gain_beyond(data, nominal, found.share) == pytest.approx(0.0, abs=1e-9)
+    near, far = (gain_beyond(data, nominal, found.share / part) for part in (3.0, 30.0))
+    assert 0.0 < near < far < found.gain
 
 
 def test_rhythms_of_wheels_are_found_with_their_price(plain):

@@ -31,27 +31,58 @@ class Lost(NamedTuple):
     arrived: Any
 
 
+class _Changes(NamedTuple):
+    """Changes of the command: window and row (changes,), whether they may be late (changes, LATEST), the command before
+    (changes, 2), what the whitened poses of their window gain where they are (changes, LATEST, numbers); those of each
+    window; whitened residuals (windows, numbers)."""
+
+    window: Any
+    row: Any
+    late: Any
+    before: Any
+    columns: Any
+    own: list
+    residual: Any
+
+
 def find_lost(data: Data, solution: Solution) -> Lost:
     """What a solution leaves for lost commands to explain."""
-    windows = data.windows
-    window, row, late = _changes(data)
-    first = windows.first[window] + row
-    before = windows.command[first - 1, windows.run[window]]
-    columns, residual = _whitened(data, solution, window, row, before)
-    own = [np.flatnonzero(window == k) for k in range(len(windows.run))]
-    best, delays = Lost(0.0, 0.0, windows.command), np.zeros(len(window), int)
+    windows, changes = data.windows, _changes(data, solution)
+    best, delays = Lost(0.0, 0.0, windows.command), np.zeros(len(changes.window), int)
     for share in SHARES:
-        price = np.where(late, -np.log(share) * np.arange(1, LATEST + 1), np.inf)
-        found = [_delayed(columns[c], residual[k], price[c]) for k, c in enumerate(own)]
-        used = [(k, *found[k]) for k in np.flatnonzero(data.use)]
-        gain = sum(more + len(own[k]) * np.log1p(-share) for k, more, _ in used)
-        if gain > best.gain and sum(int(np.sum(rows > 0)) for _, _, rows in used) >= FEWEST:
-            best = best._replace(share=float(share), gain=float(gain))
-            delays = np.concatenate([rows for _, rows in found])
+        gain, found = _taken_at(share, changes, data.use)
+        late = sum(int(np.sum(found[k] > 0)) for k in np.flatnonzero(data.use))
+        if gain > best.gain and late >= FEWEST:
+            best, delays = best._replace(share=float(share), gain=gain), np.concatenate(found)
+    first = windows.first[changes.window] + changes.row
     arrived = np.array(windows.command, float)
-    for place, run, old, rows in zip(first, windows.run[window], before, delays, strict=True):
+    for place, run, old, rows in zip(first, windows.run[changes.window], changes.before, delays, strict=True):
         arrived[place : place + rows, run] = old
     return best._replace(arrived=arrived)
+
+
+def gain_beyond(data: Data, solution: Solution, share: float) -> float:
+    """What the likeliest share of lost commands gains beyond what another share does."""
+    changes = _changes(data, solution)
+    likeliest = max(_taken_at(other, changes, data.use)[0] for other in SHARES)
+    return likeliest - _taken_at(share, changes, data.use)[0]
+
+
+def _changes(data: Data, solution: Solution) -> _Changes:
+    windows = data.windows
+    window, row, late = _changed(data)
+    before = windows.command[windows.first[window] + row - 1, windows.run[window]]
+    columns, residual = _whitened(data, solution, window, row, before)
+    own = [np.flatnonzero(window == k) for k in range(len(windows.run))]
+    return _Changes(window, row, late, before, columns, own, residual)
+
+
+def _taken_at(share: float, changes: _Changes, use: Array) -> tuple[float, list[np.ndarray]]:
+    """What the windows in use gain at a share of lost commands, and by how many rows each window's changes are late."""
+    price = np.where(changes.late, -np.log(share) * np.arange(1, LATEST + 1), np.inf)
+    found = [_delayed(changes.columns[c], changes.residual[k], price[c]) for k, c in enumerate(changes.own)]
+    gain = sum(found[k][0] + len(changes.own[k]) * np.log1p(-share) for k in np.flatnonzero(use))
+    return float(gain), [rows for _, rows in found]
 
 
 def _delayed(columns: Array, residual: Array, price: Array) -> tuple[float, np.ndarray]:
@@ -70,7 +101,7 @@ def _delayed(columns: Array, residual: Array, price: Array) -> tuple[float, np.n
     return total, rows
 
 
-def _changes(data: Data) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _changed(data: Data) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Windows and rows in which the command changes, and by how many rows (changes, LATEST) it may come late before it
     changes again."""
     windows = data.windows
