@@ -22,7 +22,8 @@ EXCESS = 2.0
 """A gap is unknown where the corrected model's error on runs that serve nothing else, at the low end of its interval,
 is this many times what noise could make it at most."""
 BELIEVABLE = 0.025
-"""Random slip beyond this part of full drive, at a correlation time of SLOW [s], is a cause nobody has found yet."""
+"""Random slip beyond this part of full drive, at a correlation time of SLOW [s], is a cause nobody has found yet, but where
+the selected set explains all but UNEXPLAINED of the error: wheels that slide never do so quite as a model has it."""
 MORE = 2.0
 """Times a simulator's slip, and excess, that a robot's may be: slip of two halves of one log of a real robot differs by
 up to 1.7."""
@@ -98,13 +99,15 @@ def temperature(finding: Finding) -> float:
 
 def unknown_probability(finding: Finding, gap: Gap, simulator: Simulator | None = None) -> float:
     """How sure it is that something outside the selected set takes part: terms of the corrector explain more, runs that
-    served nothing else are predicted worse than noise allows, or more is called slip than wheels slip. What a simulator
-    leaves unexplained as well, or calls slip, is no difference between the two."""
+    served nothing else are predicted worse than noise allows, or more is called slip than wheels slip and more than a
+    small part of the error on those runs. What a simulator leaves unexplained as well, or calls slip, is no difference
+    between the two."""
     rest = rest_of(finding, simulator)
     large = _logistic((rest - SIGNIFICANT) / SHARPNESS[1])
     explained = large * _logistic((finding.share(rest) - UNEXPLAINED) / SHARPNESS[0])
     missed = _beyond(gap.excess, believable_excess(simulator))
     slipping = _beyond(slip_of_drive(finding), believable_slip(simulator))
+    slipping *= _logistic((gap.after / max(gap.refitted, 1e-9) - UNEXPLAINED) / SHARPNESS[0])
     return 1.0 - (1.0 - explained) * (1.0 - missed) * (1.0 - slipping)
 
 

@@ -15,7 +15,7 @@ from jaxident.diagnosis.verdict import alike, judge, slip_of_drive, unknown_prob
 
 NONE: dict[str, float] = {}
 GAP = made_up("effects").gap
-
+OPEN = GAP._replace(after=GAP.refitted)
 
 DRIVE = np.array([1.0, 1.5, 0.5, 0.5, 5.0, -5.0])
 
@@ -118,10 +118,17 @@ def test_more_slip_than_wheels_have_is_unknown():
         return finding({}, ())._replace(law=law)
 
     assert slip_of_drive(slipping(0.01)) == pytest.approx(0.01)
-    assert unknown_probability(slipping(0.01), GAP) < 0.05
-    found = judge(slipping(0.1), GAP, NONE)
+    assert unknown_probability(slipping(0.01), OPEN) < 0.05
+    found = judge(slipping(0.1), OPEN, NONE)
     assert found.unknown > 0.95
     assert found.sites["drive"] + found.sites["contact"] > 0.7
+
+
+def test_slip_that_is_a_small_part_of_what_an_effect_explains_is_not():
+    sliding = finding({("traction_limit",): 3000.0}, ("traction_limit",))
+    sliding = sliding._replace(law=Law(1e-3, 5e-3, (0.1, 1.0), 0.2))
+    assert unknown_probability(sliding, GAP._replace(refitted=1120.0, after=100.0)) < 0.1
+    assert unknown_probability(sliding, GAP._replace(refitted=1120.0, after=400.0)) > 0.95
 
 
 def test_slip_is_held_against_the_drive_of_the_robot_and_not_of_a_nominal_model_that_bends():
@@ -141,10 +148,10 @@ def test_what_the_simulator_leaves_unexplained_too_is_no_difference():
         return finding({("slope",): 300.0}, ("slope",), [(term[0], rest)])._replace(law=law, data=data)
 
     robot = both(0.1, 400.0)
-    assert unknown_probability(robot, GAP) > 0.95
-    assert unknown_probability(robot, GAP, Simulator(np.zeros(3), (), both(0.1, 400.0))) < 0.05
-    assert unknown_probability(robot, GAP, Simulator(np.zeros(3), (), both(0.1, 40.0))) > 0.95, "terms"
-    assert unknown_probability(robot, GAP, Simulator(np.zeros(3), (), both(0.01, 400.0))) > 0.95, "slip"
+    assert unknown_probability(robot, OPEN) > 0.95
+    assert unknown_probability(robot, OPEN, Simulator(np.zeros(3), (), both(0.1, 400.0))) < 0.05
+    assert unknown_probability(robot, OPEN, Simulator(np.zeros(3), (), both(0.1, 40.0))) > 0.95, "terms"
+    assert unknown_probability(robot, OPEN, Simulator(np.zeros(3), (), both(0.01, 400.0))) > 0.95, "slip"
 
 
 def test_one_stretch_kept_for_judging_decides_nothing():
