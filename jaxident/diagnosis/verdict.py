@@ -22,8 +22,8 @@ EXCESS = 2.0
 """A gap is unknown where the corrected model's error on runs that serve nothing else, at the low end of its interval,
 is this many times what noise could make it at most."""
 BELIEVABLE = 0.025
-"""Random slip beyond this part of full drive, at a correlation time of SLOW [s], is a cause nobody has found yet, but where
-the selected set explains all but UNEXPLAINED of the error: wheels that slide never do so quite as a model has it."""
+"""Random slip beyond this part of full drive, at a correlation time of SLOW [s], is a cause nobody has found yet, but
+where the selected set explains all but UNEXPLAINED of the error: wheels that slide never do so quite as a model has."""
 MORE = 2.0
 """Times a simulator's slip, and excess, that a robot's may be: slip of two halves of one log of a real robot differs by
 up to 1.7."""
