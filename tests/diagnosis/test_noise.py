@@ -6,7 +6,7 @@ from support.arcs import along_arcs
 
 from jaxident.diagnosis.motion.responses import answer_to_start, respond
 from jaxident.diagnosis.noise.doubt import MEMORIES, doubt_of, draw_laws, sizes_by_memory
-from jaxident.diagnosis.noise.law import Law, covariance, first_law, is_quieter, white_whitener, whitener_of
+from jaxident.diagnosis.noise.law import Law, covariance, first_law, is_quieter, slip_parts, white_whitener, whitener_of
 from jaxident.diagnosis.noise.sizing import sample, size_noise, size_one, steady_gain
 
 ROWS, COUNT = 45, 60
@@ -119,6 +119,21 @@ def test_a_memory_is_the_cameras_where_most_windows_show_it(made, share, size, c
         law = size_noise(noise, starts, measured, responses, use)
         assert law.coloured is not None
         assert (steady_gain(noise, starts, measured, responses, use, law) > 0.0) == claimed
+
+
+def test_wheels_that_slide_sideways_at_random_are_no_memory_of_the_camera(made):
+    """Four draws, the memory in all windows: what tells it from a camera's is its direction."""
+    windows, responses, starts = made
+    numbers = np.tile(np.arange(3 * ROWS), (COUNT, 1))
+    (sideways,) = slip_parts((responses.left,), 0.2, windows, numbers)
+    slip = Law(5e-4, 4e-3, slip=(0.03, 0.35), slip_time=0.2)
+    factor = np.linalg.cholesky(covariance(slip, windows, responses) + 0.01**2 * sideways)
+    for seed in range(4):
+        noise = (factor @ np.random.default_rng(seed).normal(size=(COUNT, 3 * ROWS, 1)))[..., 0]
+        measured = windows._replace(pose=windows.pose + noise.reshape(COUNT, ROWS, 3).transpose(1, 0, 2))
+        law = size_noise(noise, starts, measured, responses, np.ones(COUNT, bool))
+        assert law.coloured is not None
+        assert steady_gain(noise, starts, measured, responses, np.ones(COUNT, bool), law) == 0.0
 
 
 def test_a_rest_of_strong_slip_is_no_camera_memory(made):

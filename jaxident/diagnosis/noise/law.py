@@ -92,15 +92,23 @@ def parts_of(slip_time, coloured_time, windows: Windows, responses: Responses, n
     step = np.asarray(windows.step).T
     time = np.cumsum(step, axis=1) - step
     if slip_time is not None:
-        memory = np.exp(-np.abs(time[:, :, None] - time[:, None, :]) / slip_time)
-        answers = (numbers_of(g, numbers) for g in (responses.along, responses.heading))
-        parts += [both * (g @ memory @ g.transpose(0, 2, 1)) for g in answers]
+        parts += slip_parts((responses.along, responses.heading), slip_time, windows, numbers)
     if coloured_time is not None:
         own = numbers_of(time, numbers // 3)
         memory = np.exp(-np.abs(own[:, :, None] - own[:, None, :]) / coloured_time)
         same = (numbers % 3)[:, :, None] == (numbers % 3)[:, None]
         parts += [both * memory * (same & wanted) for wanted in (of_position, of_heading)]
     return parts
+
+
+def slip_parts(answers: tuple[Array, ...], slip_time: float, windows: Windows, numbers: Array) -> list[np.ndarray]:
+    """What the variance of each kind of slip, by what the poses answer to it, multiplies (windows, n, n)."""
+    seen = numbers_of(numbers_seen(windows), numbers)
+    step = np.asarray(windows.step).T
+    time = np.cumsum(step, axis=1) - step
+    memory = np.exp(-np.abs(time[:, :, None] - time[:, None, :]) / slip_time)
+    own = (seen[:, :, None] * numbers_of(answer, numbers) for answer in answers)
+    return [one @ memory @ one.transpose(0, 2, 1) for one in own]
 
 
 def numbers_seen(windows: Windows) -> np.ndarray:

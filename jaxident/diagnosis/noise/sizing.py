@@ -5,6 +5,7 @@ what it takes up of the residuals is not lost from the noise. The covariance is 
 searched by average information (Gilmour, Thompson and Cullis 1995, Biometrics 51). NumPy, windows first.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +13,7 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.diagnosis.motion.responses import Responses
 from jaxident.diagnosis.motion.windows import Windows, take
-from jaxident.diagnosis.noise.law import Law, first_law, numbers_of, of_unseen, parts_of, variances_of
+from jaxident.diagnosis.noise.law import Law, first_law, numbers_of, of_unseen, parts_of, slip_parts, variances_of
 
 MOST_STEPS = 12
 SAMPLE, ROWS = 60, 20
@@ -32,8 +33,9 @@ MOST_GAIN, STEADY = 0.1, 0.15
 """Part of the windows, those that gain most by a memory of the camera, and part of the gain that the others must bring:
 a camera's error is there all the time, what a model misses where grip ends is not. The others brought 0.31 to 0.61 on
 five robots with such a memory, and less than nothing on four whose wheels slide or have play."""
-
-
+SLIDING = 10.0
+"""Log-likelihood by which wheels that slide sideways at random may explain more than a memory of the camera: on twelve
+robots with such a memory they did by 3 or not at all, on six with low grip by 49 to 500."""
 LEAST = 1e-4
 """Part of the residuals' size that is white at least: without any the covariance of slip has no inverse."""
 
@@ -81,18 +83,27 @@ def size_noise(
 
 def steady_gain(residual: Array, starts: Array, windows: Windows, responses: Responses, use: Array, law: Law) -> float:
     """What a law's memory of the camera gains on the best law without one, both sized here, arguments as in
-    `size_noise`; 0 where few windows bring it: that is no camera.
+    `size_noise`; 0 where few windows bring it, or where wheels that slide sideways at random explain more: that is no
+    camera.
 
     A window gains by its memory what it does not gain as well by the same law without that part: where few windows have
     large errors, the others gain by no longer being taken for as bad.
     """
     given = sample(residual, starts, windows, responses, use)
-    known = size_one(given, law, law.slip_time, law.coloured_time).law
+    own = size_one(given, law, law.slip_time, law.coloured_time)
     without = max((size_one(given, first_law(windows), time, None) for time in (None, *SLIP_TIMES)), key=_likelihood)
-    others = (without.law, known._replace(coloured=None, coloured_time=None))
-    gain = np.sort(_by_window(given, known) - np.maximum(*(_by_window(given, other) for other in others)))
+    others = (without.law, own.law._replace(coloured=None, coloured_time=None))
+    gain = np.sort(_by_window(given, own.law) - np.maximum(*(_by_window(given, other) for other in others)))
     most = int(np.ceil(MOST_GAIN * len(gain)))
-    return max(float(gain.sum()), 0.0) if gain[:-most].sum() > STEADY * gain.sum() else 0.0
+    steady = gain[:-most].sum() > STEADY * gain.sum()
+    sliding = max(_sliding(given, time).log_likelihood for time in SLIP_TIMES) > own.log_likelihood + SLIDING
+    return max(float(gain.sum()), 0.0) if steady and not sliding else 0.0
+
+
+def _sliding(given: Sample, time: float) -> Sized:
+    """The best variances of slip of some memory in all directions; of its speed sideways the law does not tell."""
+    sideways = slip_parts((given.responses.left,), time, given.windows, given.numbers)
+    return size_one(given, first_law(given.windows), time, None, beside=sideways)
 
 
 def _likelihood(sized: Sized) -> float:
@@ -127,11 +138,17 @@ def _rows_seen(seen: Array, count: int) -> np.ndarray:
 
 
 def size_one(
-    given: Sample, begin: Law, slip_time: float | None, coloured_time: float | None, rival: float = -np.inf
+    given: Sample,
+    begin: Law,
+    slip_time: float | None,
+    coloured_time: float | None,
+    rival: float = -np.inf,
+    beside: Sequence[Array] = (),
 ) -> Sized:
-    """The best variances of one structure, or poorer ones if it is far from beating a rival's log-likelihood."""
+    """The best variances of one structure, or poorer ones if it is far from beating a rival's log-likelihood; beside:
+    what further variances multiply."""
     residual, _, windows, responses, numbers = given
-    parts = parts_of(slip_time, coloured_time, windows, responses, numbers)
+    parts = [*parts_of(slip_time, coloured_time, windows, responses, numbers), *beside]
     size = variances_of(begin)
     if len(size) < len(parts):  # as much as the camera's variance at the poses
         means = [float(np.mean(np.diagonal(part, axis1=1, axis2=2))) for part in parts[2:]]
