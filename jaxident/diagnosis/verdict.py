@@ -107,7 +107,7 @@ def unknown_probability(finding: Finding, gap: Gap, simulator: Simulator | None 
     explained = large * _logistic((finding.share(rest) - UNEXPLAINED) / SHARPNESS[0])
     missed = _beyond(gap.excess, believable_excess(simulator))
     slipping = _beyond(slip_of_drive(finding), believable_slip(simulator))
-    slipping *= _logistic((gap.after / max(gap.refitted, 1e-9) - UNEXPLAINED) / SHARPNESS[0])
+    slipping *= _logistic((gap.left - UNEXPLAINED) / SHARPNESS[0])
     return 1.0 - (1.0 - explained) * (1.0 - missed) * (1.0 - slipping)
 
 

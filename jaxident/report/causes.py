@@ -145,8 +145,8 @@ def _beyond_words(found: Diagnosis) -> list[str]:
         words.append(f"Stretches that took no part in any fit are predicted {number(excess)} times worse than noise "
                      "allows, at the least.")  # fmt: skip
     if slip > believable_slip(found.simulator):
-        words.append(f"What is left looks like random slip of {percent(slip)} of full drive: more than wheels slip "
-                     "without a cause.")  # fmt: skip
+        words.append(f"What is left, {percent(found.gap.left)} of the error, looks like random slip of {percent(slip)} "
+                     "of full drive: more than wheels slip without a cause.")  # fmt: skip
     return words
 
 

@@ -41,6 +41,11 @@ class Gap(NamedTuple):
     replay: Floor
 
     @property
+    def left(self) -> float:
+        """The part of the refitted nominal model's error that the corrected one leaves, floor and all."""
+        return self.after / max(self.refitted, 1e-9)
+
+    @property
     def excess(self) -> float:
         """The corrected model's error, at the low end of its interval, over the high end of what noise makes."""
         errors = np.asarray(self.errors[2])
