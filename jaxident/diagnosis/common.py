@@ -104,7 +104,7 @@ def _pair(
         }
         partner[effects] = max(pairs, key=lambda other: pairs[other])
         fit = theirs[partner[effects]]
-        missing = tuple(name for name in effects if name not in fit.effects or apart(name, candidate, fit, price))
+        missing = tuple(name for name in effects if name not in fit.effects or lacks(name, fit, candidate, price))
         values[effects] = pairs[partner[effects]], missing
     chosen = max(values, key=lambda effects: values[effects][0])
     return chosen, partner[chosen], values
@@ -125,13 +125,14 @@ def shared_worth(
     return worth
 
 
-def apart(name: str, one: Candidate, other: Candidate, price: float) -> bool:
-    """Whether one of two fits has hardly any of an effect that the other has: taking one size for both would cost more
-    than `price` of -log p, and most of the larger size lies between them."""
+def lacks(name: str, fit: Candidate, other: Candidate, price: float) -> bool:
+    """Whether a fit has hardly any of an effect that another fit has: taking one size for both would cost more than
+    `price` of -log p, and most of the larger size lies between them. A fit that has more of it lacks nothing."""
     pairs = [(name, c.name) for c in COORDINATES[name]]
-    (here, own), (there, theirs) = (_searched(pairs, fit.solution) for fit in (one, other))
-    between, first, second = (_squares(step, own + theirs) for step in (here - there, here, there))
-    return 0.5 * between > price and between > MOSTLY**2 * max(first, second)
+    (here, own), (there, theirs) = (_searched(pairs, one.solution) for one in (fit, other))
+    between, mine, their = (_squares(step, own + theirs) for step in (here - there, here, there))
+    more = their < (1.0 - MOSTLY) ** 2 * mine
+    return 0.5 * between > price and between > MOSTLY**2 * max(mine, their) and not more
 
 
 def shows(name: str, fit: Candidate, found: Mapping[Any, Candidate]) -> bool:

@@ -114,7 +114,8 @@ def check_nominal(logs: Log | Sequence[Log], sim: Log | Sequence[Log] | None, mo
 
 def compare_parameters(prepared: Prepared, finding: Finding, given, common: tuple[str, ...] = ()) -> list[Parameter]:
     """Nominal parameters given (coordinates, None where none were) and refitted, in the user's units; then those of the
-    effects that the given model has in common with the robot: the right effect may have the wrong size."""
+    effects that the given model has in common with the robot: the right effect may have the wrong size. A limit that
+    never acts has none."""
     best = finding.candidates[finding.selected].solution
     if given is not None and ASIDE[0] in common and PLACES[ASIDE] not in best.places:
         given = translate.abreast_of_marker(given)  # as the refit has it, which is not told its side
@@ -127,6 +128,7 @@ def compare_parameters(prepared: Prepared, finding: Finding, given, common: tupl
         rows += [
             Parameter(f"{name} {key}", _finite(before[key]), effect.parameters[key], deviation)
             for key, deviation in (effect.standard_deviation or {}).items()
+            if isfinite(effect.parameters[key])
         ]
     return rows
 

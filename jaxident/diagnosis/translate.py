@@ -108,10 +108,12 @@ def effect_values(name: str, vector: Array, largest: float) -> dict[str, float]:
 def to_model(
     prepared: Prepared, solution: Solution, law: Law, effects: tuple[str, ...], direct: dict[str, dict] | None = None
 ) -> Model:
-    """A solution as a model with its noise law and effects, `direct` ones by their parameters."""
+    """A solution as a model with its noise law and effects, `direct` ones by their parameters. Limits that never act
+    are left out."""
     _, values, _ = parameters_of(solution, prepared.largest)
     steps = np.concatenate([np.diff(run.t) for run in prepared.log.runs()])
     found = [effect_of(name, solution, prepared.largest) for name in effects]
+    found = [effect for effect in found if np.all(np.isfinite(list(effect.parameters.values())))]
     found += [Effect(name, dict(parameters)) for name, parameters in (direct or {}).items()]
     coupling: Any = np.array(values[8:10])
     return Model(

@@ -10,7 +10,7 @@ from jaxident.diagnosis import common
 from jaxident.diagnosis.causes.candidates import Candidate
 from jaxident.diagnosis.causes.corrector import Term
 from jaxident.diagnosis.causes.search import Solution
-from jaxident.diagnosis.common import apart, explain_together, shared_worth, shows
+from jaxident.diagnosis.common import explain_together, lacks, shared_worth, shows
 from jaxident.diagnosis.motion.coordinates import PLACES, free_places, neutral_vector
 
 TERM = Term("drive", "v^3 in the acceleration along")
@@ -94,7 +94,7 @@ def test_a_coordinate_that_logs_say_nothing_about_hides_no_other():
     k = known.solution.places.index(PLACES["traction_limit", "spin"])
     known.solution.covariance[k, k] = 1e212
     assert shows("traction_limit", known._replace(gain=50.0), NOTHING)
-    assert apart("traction_limit", known, fit(("traction_limit",), 0.0), PRICE)
+    assert lacks("traction_limit", fit(("traction_limit",), 0.0), known, PRICE)
 
 
 def test_steps_of_a_command_that_both_have_are_no_difference(together):
@@ -128,11 +128,12 @@ def test_beside_others_an_effect_of_one_alone_pays_for_the_terms_left_in_its_own
 
 def test_the_same_effect_of_another_size_is_a_parameter_and_hardly_any_of_it_a_difference():
     large, half, little = (fit(("transport_delay",), size) for size in (0.1, 0.06, 0.02))
-    assert not apart("transport_delay", large, large, PRICE)
-    assert not apart("transport_delay", large, half, PRICE)
-    assert apart("transport_delay", large, little, PRICE)
+    assert not lacks("transport_delay", large, large, PRICE)
+    assert not lacks("transport_delay", half, large, PRICE)
+    assert lacks("transport_delay", little, large, PRICE)
+    assert not lacks("transport_delay", large, little, PRICE), "it has more of it, which is none of the robot's effects"
     unsure = fit(("transport_delay",), 0.02, deviation=0.05)
-    assert not apart("transport_delay", large, unsure, PRICE), "a common size costs hardly anything"
+    assert not lacks("transport_delay", unsure, large, PRICE), "a common size costs hardly anything"
 
 
 def test_what_an_effect_takes_up_is_not_held_against_it(monkeypatch, together):

@@ -1,11 +1,15 @@
 """Coordinates of a search as parameters of the catalogue, with their deviations."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from jaxident.diagnosis.causes.search import Solution
+from jaxident.diagnosis.diagnose import compare_parameters
 from jaxident.diagnosis.motion.coordinates import PLACES, free_places, neutral_vector
-from jaxident.diagnosis.translate import effect_of
+from jaxident.diagnosis.noise.law import Law
+from jaxident.diagnosis.translate import effect_of, to_model
 
 PLACE = {key: PLACES["traction_limit", key] for key in ("inverse_square", "dry", "spin")}
 
@@ -31,3 +35,20 @@ def test_where_nothing_tells_how_far_left_a_marker_is_it_may_lie_anywhere():
     found = effect_of("marker_offset", solution, 2.0)
     assert found.parameters == {"ahead": 0.0, "left": 0.0}
     assert found.standard_deviation == pytest.approx({"ahead": 1e-3, "left": 0.3 / 3.0**0.5})
+
+
+def test_a_limit_that_never_acts_is_none_of_the_model_and_has_no_size():
+    """As robot and simulator may have it in common, whose commands never change fast enough: no file holds infinity."""
+    effects = "input_rate_limit", "turn_loss"
+    places = free_places(effects)
+    vector = neutral_vector(np.ones(10))
+    vector[PLACES["turn_loss", "loss"]] = 0.3
+    solution = Solution(vector, None, places, None, 0.0, 1e-6 * np.eye(len(places)), 1)
+    log = SimpleNamespace(runs=lambda: [SimpleNamespace(t=0.03 * np.arange(9))])
+    prepared = SimpleNamespace(log=log, largest=1.0)
+    model = to_model(prepared, solution, Law(1e-3, 5e-3), effects)
+    assert [effect.name for effect in model.effects] == ["turn_loss"]
+    finding = SimpleNamespace(candidates={effects: SimpleNamespace(solution=solution)}, selected=effects)
+    rows = compare_parameters(prepared, finding, vector, effects)
+    assert all(np.isfinite(row.refitted) for row in rows)
+    assert rows[-1].name == "turn_loss loss"
