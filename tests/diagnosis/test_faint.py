@@ -140,6 +140,17 @@ def test_commands_that_came_late_are_found_one_by_one(plain):
     assert find_lost(*plain).gain < 4.0
 
 
+def test_a_fit_begun_where_the_robot_runs_away_begins_without_effects(plain):
+    """Sizes found on another robot's logs may be a motor here: poses overflow, and nothing can be told from there."""
+    data, nominal = plain
+    vector = nominal.vector.copy()
+    vector[PLACES["turn_loss", "loss"]] = -1e5
+    found = refit(data, vector, nominal.starts, ("turn_loss",))
+    assert found.cost <= nominal.cost
+    assert np.all(np.isfinite(found.covariance))
+    assert abs(found.vector[PLACES["turn_loss", "loss"]]) < 0.1
+
+
 def test_a_share_of_late_commands_is_held_against_another_one():
     """A smaller share pays more for every change that came late and less for every one that did not; what was late
     beyond doubt is explained by either."""

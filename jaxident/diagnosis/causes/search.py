@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.motion.coordinates import PLACES, STEPPED, free_places, limits
+from jaxident.diagnosis.motion.coordinates import NOMINAL, PLACES, STEPPED, free_places, limits, neutral_vector
 from jaxident.diagnosis.motion.linear import Linear, follow, gram, linearise, normal
 from jaxident.diagnosis.motion.windows import Windows
 
@@ -41,13 +41,16 @@ class Solution(NamedTuple):
 
 
 def refit(data: Data, vector: Array, starts: Array, effects: tuple[str, ...], hold: tuple = (), most=MOST_STEPS):
-    """The fit nearest downhill of a vector and starts with the coordinates of `effects` free, but those in `hold`."""
+    """The fit nearest downhill of a vector and starts with the coordinates of `effects` free, but those in `hold`. Where
+    the robot would run away there, effects begin at neutral."""
     held = {PLACES[pair] for pair in {*hold, *STEPPED}}
     places = [place for place in free_places(effects) if place not in held]
     vector, starts = np.array(vector), np.array(starts)
     low, high = (bound[places] for bound in limits())
-    linear = linearise(vector, starts, data.windows, places)
-    products, solve = _products(data, linear)
+    linear, products, solve = _around(data, vector, starts, places)
+    if not np.all(np.isfinite(products)):  # another robot's sizes: with these one would run away
+        vector = neutral_vector(vector[: len(NOMINAL)])
+        linear, products, solve = _around(data, vector, starts, places)
     cost, damping = 0.5 * products[-1, -1] + _taken(data, linear), 1e-4
     for step_number in range(1, most + 1):
         step, promised = _step(products, vector[places], low, high, damping)
@@ -58,12 +61,11 @@ def refit(data: Data, vector: Array, starts: Array, effects: tuple[str, ...], ho
         step = new_vector[places] - vector[places]
         moved = solve[:, :, -1] - solve[:, :, :-1] @ step
         new_starts, new_cost = best_starts(data, new_vector, starts, moved.T)
-        if new_cost < cost:
+        there = _around(data, new_vector, new_starts, places) if new_cost < cost else None
+        if there is not None and np.all(np.isfinite(there[1])):  # beside a robot that runs away nothing can be told
             gained, damping = cost - new_cost, max(0.2 * damping, 1e-7)
-            vector, starts = new_vector, new_starts
-            linear = linearise(vector, starts, data.windows, places)
-            products, solve = _products(data, linear)
-            cost = new_cost
+            vector, starts, cost = new_vector, new_starts, new_cost
+            linear, products, solve = there
             if gained < ENOUGH:
                 break
         else:
@@ -71,6 +73,12 @@ def refit(data: Data, vector: Array, starts: Array, effects: tuple[str, ...], ho
             if damping > 1e6:
                 break
     return Solution(vector, starts, places, linear, cost, _covariance(products), step_number)
+
+
+def _around(data: Data, vector: Array, starts: Array, places: list[int]) -> tuple[Linear, np.ndarray, np.ndarray]:
+    """The linearisation there, and its `_products`."""
+    linear = linearise(vector, starts, data.windows, places)
+    return linear, *_products(data, linear)
 
 
 def best_starts(data: Data, vector: Array, starts: Array, moved: Array) -> tuple[np.ndarray, float]:
