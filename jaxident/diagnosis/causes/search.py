@@ -41,8 +41,8 @@ class Solution(NamedTuple):
 
 
 def refit(data: Data, vector: Array, starts: Array, effects: tuple[str, ...], hold: tuple = (), most=MOST_STEPS):
-    """The fit nearest downhill of a vector and starts with the coordinates of `effects` free, but those in `hold`. Where
-    the robot would run away there, effects begin at neutral."""
+    """The fit nearest downhill of a vector and starts with the coordinates of `effects` free, but those in `hold`.
+    Where the robot would run away there, effects begin at neutral."""
     held = {PLACES[pair] for pair in {*hold, *STEPPED}}
     places = [place for place in free_places(effects) if place not in held]
     vector, starts = np.array(vector), np.array(starts)
