@@ -47,12 +47,10 @@ def lead(found: Diagnosis) -> str:
             f"{number(low)} to {number(high)}."
         )
     if found.verdict == "effects":
-        count = (
-            "one unmodelled effect"
-            if len(found.selected) == 1
-            else f"{COUNTS.get(len(found.selected), 'several')} unmodelled effects"
-        )
-        return f"The gap comes from {count}: {causes.in_words(found)}. {_shrinks(found)}{_doubt(found)}"
+        many = f"{COUNTS.get(len(found.selected), 'several')} unmodelled effects"
+        count = "one unmodelled effect" if len(found.selected) == 1 else many
+        rest = f"{_resized(found)} {_shrinks(found)}{_doubt(found)}"
+        return f"The gap comes from {count}: {causes.in_words(found)}.{rest}"
     if found.verdict == "unknown":
         return f"There is a gap that no effect of the catalogue explains{_place(found)}. {_best_try(found)}"
     return f"These logs do not suffice for a verdict. {found.next}"
@@ -64,6 +62,19 @@ def _moved(found: Diagnosis) -> str:
     parts = (f"{p.name} is {number(p.refitted)}, not {number(p.nominal)}" for p in told)
     more = f" and {len(moved) - len(told)} more differ" if len(moved) > len(told) else ""
     return f"{'; '.join(parts)}{more}"
+
+
+def _resized(found: Diagnosis) -> str:
+    """Effects that the given model has too, where most of the larger size lies between the two."""
+    known = [p for p in found.parameters if p.name not in NOMINAL and p.standard_deviation > 0.0]
+    apart = [p for p in known if _deviations(p) > DIFFERENT and _mostly_new(p.refitted, p.nominal)]
+    told = [f"{plain(p.name)} is {number(p.refitted)}, not {number(p.nominal)}" for p in apart]
+    return f" Effects that the model has already differ in size: {'; '.join(told)}." if told else ""
+
+
+def _mostly_new(refitted: float, given: float | None) -> bool:
+    """Whether most of the larger size lies between two."""
+    return given is not None and 2.0 * abs(refitted - given) > max(abs(refitted), abs(given))
 
 
 def _deviations(parameter: Parameter) -> float:

@@ -7,6 +7,7 @@ import pytest
 from support.diagnoses import LARGEST, VERDICTS, made_up
 
 from jaxident.diagnosis.causes.candidates import Candidate
+from jaxident.diagnosis.diagnose import Parameter
 from jaxident.diagnosis.motion.coordinates import free_places
 from jaxident.diagnosis.visible import smallest_sizes
 from jaxident.effects.catalogue import CATALOGUE
@@ -53,6 +54,19 @@ def test_lead_tells_sizes_shrink_and_look_alikes():
     assert "delay 0.0521 ± 0.0034 s" in told
     assert "the gap shrinks by 99 % (90 % interval 96 % to 101 %)" in told
     assert told.endswith("This input cannot tell transport delay from motor lag.")
+
+
+def test_lead_tells_known_effects_of_another_size():
+    sizes = [
+        Parameter("transport_delay delay", 0.07, 0.214, 0.002),
+        Parameter("marker_offset ahead", 0.02, 0.03, 0.001),  # a third more
+        Parameter("turn_loss loss", 1.0, 4.0, 1.0),  # hardly known
+        Parameter("traction_limit dry", 0.0, 1.0, 0.0),  # one of a few values
+        Parameter("input_saturation level", None, 0.5, 0.01),
+    ]
+    told = lead(made_up("effects")._replace(parameters=sizes))
+    assert "Effects that the model has already differ in size: transport delay delay is 0.214, not 0.07. With" in told
+    assert "already" not in lead(made_up("effects", given=True))
 
 
 def test_effects_of_the_camera_alone_tell_no_shrink():
