@@ -65,10 +65,11 @@ def _moved(found: Diagnosis) -> str:
 
 
 def _resized(found: Diagnosis) -> str:
-    """Effects that the given model has too, where most of the larger size lies between the two."""
+    """Effects that the given model has too, where most of the larger size lies between the two: the clearest three."""
     known = [p for p in found.parameters if p.name not in NOMINAL and p.standard_deviation > 0.0]
     apart = [p for p in known if _deviations(p) > DIFFERENT and _mostly_new(p.refitted, p.nominal)]
-    told = [f"{plain(p.name)} is {number(p.refitted)}, not {number(p.nominal)}" for p in apart]
+    clearest = sorted(apart, key=_deviations, reverse=True)[:3]
+    told = [f"{plain(p.name)} is {number(p.refitted)}, not {number(p.nominal)}" for p in clearest]
     return f" Effects that the model has already differ in size: {'; '.join(told)}." if told else ""
 
 
