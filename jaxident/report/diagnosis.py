@@ -112,8 +112,7 @@ def _place(found: Diagnosis) -> str:
     channel, share = max(found.where.excess.items(), key=lambda pair: pair[1])
     site, likely = max(found.judgement.sites.items(), key=lambda pair: pair[1])
     seen = f"{percent(share)} of it shows {words.CHANNELS[channel]}" if share > 0.0 else ""
-    looks = f"it looks like something {SITES[site]}" if likely > 0.0 and site != "time" else ""
-    looks = "it looks like something that changes during the session" if likely > 0.0 and site == "time" else looks
+    looks = f"it looks like {words.LOOKS[site]}" if likely > 0.0 else ""
     told = ", and ".join(part for part in (seen, looks) if part)
     return f"; {told}" if told else ""
 

@@ -50,6 +50,15 @@ SITES = {
     "camera": "the measurement of the pose",
 }
 
+LOOKS = {
+    "actuation": "something between the command and the motors",
+    "drive": "something in the motors, their friction or the inertia",
+    "contact": "something between wheels and floor",
+    "time": "something that changes during the session",
+    "camera": "something in how the pose is measured",
+}
+"""What a gap of each site looks like, within a sentence."""
+
 CHANNELS = {"along": "in the direction of travel", "lateral": "sideways", "heading": "in heading"}
 
 VARIABLES = {

@@ -14,7 +14,7 @@ from jaxident.effects.catalogue import CATALOGUE
 from jaxident.report import Figure, Table, render
 from jaxident.report.causes import BESIDE
 from jaxident.report.diagnosis import diagnosis_page, lead
-from jaxident.report.words import EFFECTS, SITES, chance, measured, number, parameters, percent, together
+from jaxident.report.words import EFFECTS, LOOKS, SITES, chance, measured, number, parameters, percent, together
 
 LEADS = {
     "no_gap": "No gap: the model predicts these logs 1 s ahead as well as noise allows",
@@ -67,6 +67,13 @@ def test_lead_tells_known_effects_of_another_size():
     told = lead(made_up("effects")._replace(parameters=sizes))
     assert "Effects that the model has already differ in size: transport delay delay is 0.214, not 0.07. With" in told
     assert "already" not in lead(made_up("effects", given=True))
+
+
+@pytest.mark.parametrize("site", SITES)
+def test_lead_tells_what_an_unknown_gap_looks_like(site):
+    found = made_up("unknown")
+    found = found._replace(judgement=found.judgement._replace(sites={site: 0.9}))
+    assert f"and it looks like {LOOKS[site]}. The best" in lead(found)
 
 
 def test_effects_of_the_camera_alone_tell_no_shrink():
