@@ -11,12 +11,13 @@ import json
 import pathlib
 
 import jaxident as ji
+from jaxident.diagnosis.causes.candidates import ENOUGH
 from jaxident.diagnosis.causes.direct import direct_evidence
-from jaxident.diagnosis.causes.which import search_effects
 from jaxident.diagnosis.diagnose import decide
 from jaxident.diagnosis.extent.measure import measure
 from jaxident.diagnosis.motion.coordinates import COORDINATES
 from jaxident.diagnosis.prepare import prepare
+from jaxident.diagnosis.repair import search
 from jaxident.diagnosis.verdict import judge
 from jaxident.effects import CATALOGUE
 
@@ -24,7 +25,7 @@ from .intervals import wilson
 
 
 def main() -> None:
-    """Diagnose every such case twice, with the effect in the catalogue and without; write what came out."""
+    """Diagnose every such case without its effect in the catalogue; write what came out."""
     parser = argparse.ArgumentParser(description=__doc__)
     for name in ("cases", "answers", "out"):
         parser.add_argument(f"--{name}", required=True, type=pathlib.Path)
@@ -47,14 +48,15 @@ def main() -> None:
 def without(case: pathlib.Path, effect: str) -> dict:
     """Verdict, what was named, and whether the most probable site is that of the effect that was left out."""
     logs = [ji.read_log(path) for path in sorted(case.glob("real_*"))]
-    prepared = prepare(logs, None)
-    finding = search_effects(prepared.windows, prepared.naming, prepared.nominal, prepared.law, without=(effect,))
+    prepared, finding = search(prepare(logs, None), without=(effect,))
     gap, _, _ = measure(prepared, finding, None, ())
-    judgement = judge(finding, gap, direct_evidence(prepared, finding))
+    extra = direct_evidence(prepared, finding)
+    judgement = judge(finding, gap, extra)
     verdict = decide(prepared, judgement, [])
     site = max(judgement.sites, key=judgement.sites.__getitem__)
     right = CATALOGUE[effect].site
-    return {"unknown": verdict == "unknown", "verdict": verdict, "named": list(finding.selected), "site": site == right}
+    named = [*finding.selected, *(name for name, evidence in extra.items() if evidence > ENOUGH)]
+    return {"unknown": verdict == "unknown", "verdict": verdict, "named": named, "site": site == right}
 
 
 if __name__ == "__main__":
