@@ -110,7 +110,8 @@ def plan(case: dict) -> list[dict]:
 
 
 def simulate_runs(runs: list[dict]) -> list[np.ndarray]:
-    """Logs (rows, 6) of runs of equal length, in one batch."""
+    """Logs (rows, 6) of runs of equal length, in one batch; without generators nothing in it happens by chance."""
+    rngs = [run["rng"] for run in runs]
     period = np.array([run["period"] for run in runs])
     poses = batch_robot.simulate(
         [run["robot"] for run in runs],
@@ -120,7 +121,7 @@ def simulate_runs(runs: list[dict]) -> list[np.ndarray]:
         np.array([run["start"] for run in runs]),
         np.array([run["session_time"] for run in runs]),
         slip=np.stack([run["slip"] for run in runs], axis=1),
-        rngs=[run["rng"] for run in runs],
+        rngs=None if None in rngs else rngs,
     )
     return [as_log(run, poses[:, k]) for k, run in enumerate(runs)]
 

@@ -81,6 +81,15 @@ def test_the_true_model_shrinks_the_gap_to_nothing():
     assert found["shrink"] > 0.999
 
 
+def test_fresh_runs_know_no_chance():
+    """A delay that jitters has its mean, a lost command arrives."""
+    case = cases.describe(4, "pair", ["transport_delay", "lost_commands"], slip=True, sim=None, other=True)
+    assert case["effects"][0]["parameters"]["form"] == 1.0
+    steady = cases.describe(4, "single", ["transport_delay"], slip=True, sim=None)
+    for (jittered, _), (expected, _) in zip(fresh_runs(case, count=2), fresh_runs(steady, count=2), strict=True):
+        np.testing.assert_array_equal(jittered.pose, expected.pose)
+
+
 def test_local_motion_is_in_the_frame_of_its_start():
     pose = np.array([[1.0, 2.0, np.pi / 2], [1.0, 3.0, 3.1], [0.0, 3.0, -3.1]])
     assert local_motion(pose, 2) == pytest.approx(np.array([[1.0, 1.0, 2 * np.pi - 3.1 - np.pi / 2]]))
