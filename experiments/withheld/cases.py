@@ -121,7 +121,7 @@ def simulate_runs(runs: list[dict]) -> list[np.ndarray]:
         np.array([run["start"] for run in runs]),
         np.array([run["session_time"] for run in runs]),
         slip=np.stack([run["slip"] for run in runs], axis=1),
-        rngs=None if None in rngs else rngs,
+        rngs=rngs if any(rngs) else None,
     )
     return [as_log(run, poses[:, k]) for k, run in enumerate(runs)]
 

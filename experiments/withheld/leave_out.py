@@ -1,4 +1,4 @@
-"""Every catalogue effect once as an unknown one.
+"""Effects of the catalogue as unknown ones, each left out in turn.
 
     python -m experiments.withheld.leave_out --cases CASES --answers ANSWERS --out FILE.json
 
@@ -11,8 +11,7 @@ import json
 import pathlib
 
 import jaxident as ji
-from jaxident.diagnosis.causes.candidates import ENOUGH
-from jaxident.diagnosis.causes.direct import direct_evidence
+from jaxident.diagnosis.causes.direct import direct_evidence, present
 from jaxident.diagnosis.diagnose import decide
 from jaxident.diagnosis.extent.measure import measure
 from jaxident.diagnosis.motion.coordinates import COORDINATES
@@ -55,7 +54,7 @@ def without(case: pathlib.Path, effect: str) -> dict:
     verdict = decide(prepared, judgement, [])
     site = max(judgement.sites, key=judgement.sites.__getitem__)
     right = CATALOGUE[effect].site
-    named = [*finding.selected, *(name for name, evidence in extra.items() if evidence > ENOUGH)]
+    named = list(present(finding, extra))
     return {"unknown": verdict == "unknown", "verdict": verdict, "named": named, "site": site == right}
 
 

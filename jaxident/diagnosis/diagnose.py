@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from jaxident.diagnosis import translate
 from jaxident.diagnosis.causes.candidates import ENOUGH, Finding
-from jaxident.diagnosis.causes.direct import direct_effects, direct_evidence
+from jaxident.diagnosis.causes.direct import direct_effects, direct_evidence, present
 from jaxident.diagnosis.extent.measure import Gap, measure
 from jaxident.diagnosis.extent.shrink import Shrink
 from jaxident.diagnosis.extent.where import Place
@@ -88,15 +88,15 @@ def diagnose(
         simulator, finding, values = inspect_simulator(sim, prepared, finding)
     told = None if simulator is None else simulator.vector
     extra = direct_evidence(prepared, finding, ENOUGH if simulator is None else simulator.price)
-    present = (*finding.selected, *(name for name, evidence in extra.items() if evidence > ENOUGH))
-    common, surplus = shared(present, simulator)
-    selected = tuple(name for name in present if name not in common)
+    shown = present(finding, extra)
+    common, surplus = shared(shown, simulator)
+    selected = tuple(name for name in shown if name not in common)
     gap, where, shrinks = measure(prepared, finding, told, common, seed)
     judgement = judge(finding, gap, extra, simulator, values)
     known = answers(finding.data, finding.nominal, prepared.largest)
     parameters = compare_parameters(prepared, finding, told, common)
     verdict = decide(prepared, judgement, parameters)
-    best, direct = finding.candidates[finding.selected].solution, direct_effects(prepared, finding, present)
+    best, direct = finding.candidates[finding.selected].solution, direct_effects(prepared, finding, shown)
     corrected = translate.to_model(prepared, best, finding.law, finding.selected, direct)
     nominal = translate.to_model(prepared, finding.nominal, finding.law, ())
     return Diagnosis(verdict, judgement, gap, where, selected if verdict == "effects" else (), parameters,

@@ -13,7 +13,8 @@ from jaxident.diagnosis.visible import smallest_sizes
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.report import Figure, Table, render
 from jaxident.report.causes import BESIDE
-from jaxident.report.diagnosis import diagnosis_page, lead
+from jaxident.report.diagnosis import diagnosis_page
+from jaxident.report.lead import lead
 from jaxident.report.words import EFFECTS, LOOKS, SITES, chance, measured, number, parameters, percent, together
 
 LEADS = {
@@ -74,6 +75,14 @@ def test_lead_tells_what_an_unknown_gap_looks_like(site):
     found = made_up("unknown")
     found = found._replace(judgement=found.judgement._replace(sites={site: 0.9}))
     assert f"and it looks like {LOOKS[site]}. The best" in lead(found)
+
+
+def test_lead_tells_the_best_set_where_its_shrink_is_unknown():
+    found = made_up("unknown")
+    gap = found.gap._replace(shrink=found.gap.shrink._replace(value=None))
+    assert f"Of the best known set, {together(found.finding.selected)}, no shrink" in lead(found._replace(gap=gap))
+    found = found._replace(finding=found.finding._replace(selected=()))
+    assert lead(found).endswith("No set of known effects makes it smaller.")
 
 
 def test_effects_of_the_camera_alone_tell_no_shrink():

@@ -23,6 +23,11 @@ def direct_evidence(prepared: Prepared, finding: Finding, price: float = ENOUGH)
     }
 
 
+def present(finding: Finding, extra: dict[str, float]) -> tuple[str, ...]:
+    """Names of the effects that the search selected, and of those that show without a refit by `direct_evidence`."""
+    return (*finding.selected, *(name for name, evidence in extra.items() if evidence > ENOUGH))
+
+
 def _memory(finding: Finding, price: float) -> float:
     """Evidence for a memory of the camera; beside others it pays what a further effect does."""
     data, solution = finding.data, finding.candidates[finding.selected].solution
