@@ -77,6 +77,24 @@ def between(log: Log, first: float | None, last: float | None) -> Log:
     return Log(*(np.asarray(column)[kept] for column in log))
 
 
+def repeats(log: Log) -> np.ndarray:
+    """Boolean (samples,): rows whose pose equals the one before in all three numbers."""
+    pose = np.stack([np.asarray(column) for column in log.pose])
+    same = np.concatenate([[False], np.all(pose[:, 1:] == pose[:, :-1], axis=0)])
+    return same & ~first_rows(log)
+
+
+def blind(log: Log, rows: Any) -> Log:
+    """The log without the poses of some rows, boolean (samples,)."""
+    x, y, theta = (np.where(rows, np.nan, column) for column in log.pose)
+    return log._replace(x=x, y=y, theta=theta)
+
+
+def run_begins(log: Log) -> np.ndarray:
+    """The row (runs,) at which each run begins."""
+    return np.flatnonzero(first_rows(log))
+
+
 def first_rows(log: Log) -> np.ndarray:
     """Boolean (samples,): the first row of each run."""
     run = np.asarray(log.run)

@@ -14,7 +14,7 @@ import jaxident as ji
 from jaxident.diagnosis.causes.direct import direct_evidence, present
 from jaxident.diagnosis.diagnose import decide
 from jaxident.diagnosis.extent.measure import measure
-from jaxident.diagnosis.motion.coordinates import COORDINATES
+from jaxident.effects.coordinates import COORDINATES
 from jaxident.diagnosis.prepare import prepare
 from jaxident.diagnosis.repair import search
 from jaxident.diagnosis.verdict import judge

@@ -8,7 +8,7 @@ from jaxident.diagnosis.causes.search import Data, refit
 from jaxident.diagnosis.causes.sets import refit_each
 from jaxident.diagnosis.extent.gap import early_inverse, last_errors
 from jaxident.diagnosis.extent.measure import judging_windows, settled
-from jaxident.diagnosis.motion.coordinates import COORDINATES
+from jaxident.effects.coordinates import COORDINATES
 from jaxident.diagnosis.noise.law import first_law, white_whitener
 from jaxident.diagnosis.prepare import BURN, prepare
 from jaxident.log import Log

@@ -1,5 +1,6 @@
 """`jaxident diagnose`."""
 
+import dataclasses
 import os
 
 import click
@@ -12,6 +13,7 @@ SENTENCE = {
     "no_gap": "no gap: the nominal model predicts these runs as well as their noise allows",
     "parameters": "the model's form is right, its parameters are not",
     "effects": "the nominal model misses {effects}",
+    "partly": "the nominal model misses {effects}, and something else that no named effect covers",
     "unknown": "there is a gap that no effect of the catalogue explains",
     "undecided": "undecided: more data are needed",
 }
@@ -54,6 +56,7 @@ def command(logs, sim, model, horizon, out, seed):
     from jaxident.files.diagnosis import diagnosis_to_dict
     from jaxident.files.logs import find_simulated, read_log, read_logs
     from jaxident.files.models import load_model, save_model
+    from jaxident.report.account import account_lines
     from jaxident.report.diagnosis import diagnosis_page
     from jaxident.report.page import write_page
 
@@ -63,9 +66,12 @@ def command(logs, sim, model, horizon, out, seed):
     make_folder(out)  # a folder that cannot be made is told before the work, not after it
     with working("diagnosing"):
         found = diagnose(records, sim=theirs or None, model=nominal, horizon=horizon, seed=seed)
+    found = _with_origin(found, logs, seed)
     content = diagnosis_to_dict(found)
+    for line in account_lines(found.account):
+        click.echo(line)
     click.echo(f"verdict: {SENTENCE[found.verdict].format(effects=' and '.join(found.selected))}")
-    click.echo(table([("cause", "probability", "site"), *_causes(found)]))
+    click.echo(table([("cause", "takes part", "site"), *_causes(found)]))
     click.echo(_gap(found))
     if found.surplus:
         click.echo(f"your simulator has, and the robot has not: {', '.join(found.surplus)}")
@@ -80,19 +86,36 @@ def command(logs, sim, model, horizon, out, seed):
     wrote(page)
 
 
+def _with_origin(found, logs, seed: int):
+    """The diagnosis, its models saying where they come from."""
+    import jaxident
+
+    told = {"version": jaxident.__version__, "logs": tuple(logs), "seed": seed}
+    models = {
+        name: dataclasses.replace(model, provenance=model.provenance._replace(**told))
+        for name, model in (("nominal_model", found.nominal_model), ("corrected_model", found.corrected_model))
+    }
+    return found._replace(**models)
+
+
 def _causes(found) -> list[tuple[str, ...]]:
     rows = [(c.effect, f"{c.probability:.3f}", c.site) for c in found.judgement.causes]
-    rows.append(("none", f"{found.judgement.none:.3f}", ""))
-    return [*rows, ("unknown", f"{found.judgement.unknown:.3f}", "")]
+    return [*rows, ("something that no named effect covers", f"{found.judgement.unexplained:.3f}", "")]
 
 
 def _gap(found) -> str:
-    gap = found.gap
-    line = (
-        f"squared pose error at {gap.horizon:.3g} s over the camera's variance: {gap.before:.3g} as given, "
-        f"{gap.refitted:.3g} refitted, {gap.after:.3g} corrected, floor {gap.floor:.3g}"
-    )
+    from jaxident.report.account import plain_text
+    from jaxident.report.words import error
+
+    gap, rms = found.gap, found.gap.rms
+    rows = [("model", "error", "camera variances")]
+    given = [("before", "as given", gap.before)] if any(p.nominal is not None for p in found.parameters) else []
+    names = [*given, ("refitted", "nominal, parameters refitted" if given else "nominal", gap.refitted)]
+    for key, name, level in (*names, ("after", "corrected", gap.after), ("floor", "noise alone", gap.floor)):
+        rows.append((name, plain_text(error(rms[key])), f"{level:.3g}"))
+    lines = f"root mean square error {gap.horizon:.3g} s ahead\n{table(rows)}"
     if gap.shrink.value is None or gap.shrink.interval is None:
-        return line
+        return lines
     low, high = gap.shrink.interval
-    return f"{line}; the gap shrinks by {100 * gap.shrink.value:.0f} % ({100 * low:.0f} to {100 * high:.0f} %)"
+    told = f"{100 * gap.shrink.value:.0f} % ({100 * low:.0f} to {100 * high:.0f} %, 90 % interval)"
+    return f"{lines}\nof the error beyond noise the corrected model takes away {told}"

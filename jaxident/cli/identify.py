@@ -68,9 +68,11 @@ def command(logs, method, noise_law, coupling, d_max, reading, count, resample, 
     start_jax()
     import jaxident
     from jaxident.estimation.identify import identify
+    from jaxident.estimation.session import with_session
     from jaxident.estimation.verdict import verdicts
     from jaxident.files.logs import read_logs
     from jaxident.files.models import model_to_dict, save_model
+    from jaxident.log import join
     from jaxident.robot.model import Provenance
 
     for option in [name for name, value in (("--report", report), ("--bootstrap", count)) if value is not None]:
@@ -81,7 +83,7 @@ def command(logs, method, noise_law, coupling, d_max, reading, count, resample, 
     with working("identifying"):
         found = identify(records, method, reading=reading and reading.replace("-", "_"), **settings)
     again = count and _resample(found, records, count, resample, seed, d_max)
-    origin = Provenance(jaxident.__version__, method, tuple(logs))
+    origin = with_session(Provenance(jaxident.__version__, method, tuple(logs)), join(records))
     model = dataclasses.replace(found.model, provenance=origin)
     rows = verdicts(model, max(float(abs(u).max()) for record in records for u in record.command))
     _say(found, rows, method, again)

@@ -4,6 +4,7 @@ import click
 
 from jaxident.cli.progress import working
 from jaxident.cli.session import json_option, write_json, wrote
+from jaxident.errors import WorkError
 from jaxident.start import start_jax
 
 
@@ -15,30 +16,57 @@ from jaxident.start import start_jax
 @click.option("--stride", type=click.IntRange(1), metavar="S", help="Rows between starts (default: the horizon).")
 @click.option("--from", "first", type=float, metavar="T", help="Use the rows from this time [s] on.")
 @click.option("--to", "last", type=float, metavar="T", help="Use the rows up to this time [s].")
+@click.option("--session-time", type=float, metavar="S", help="Session time [s] at the first row of LOG, for effects "
+              "that drift (default: as the model's provenance says).")  # fmt: skip
 @click.option("--out", required=True, metavar="CSV", help="The predictions to write (.csv or .csv.gz).")
 @json_option
-def command(model, log, horizon, burn_in, stride, first, last, out, json_file):
+def command(model, log, horizon, burn_in, stride, first, last, session_time, out, json_file):
     """Free runs of MODEL over LOG, each start state estimated from the rows before it alone.
 
     Example: jaxident predict model.json log.csv --horizon 100 --out predicted.csv
     """
     start_jax()
     from jaxident.estimation.predict import predict, prediction_error
+    from jaxident.estimation.session import time_in_session
     from jaxident.files.logs import read_log
     from jaxident.files.models import load_model
     from jaxident.files.predictions import write_prediction
     from jaxident.log import between
 
-    record = between(read_log(log), first, last)
+    robot, whole = load_model(model), read_log(log)
+    record = between(whole, first, last)
+    begin, known = time_in_session(robot, whole, record)
+    begin = begin if session_time is None else session_time
     with working("predicting"):
-        prediction = predict(load_model(model), record, horizon, burn_in=burn_in, stride=stride)
+        prediction = predict(robot, record, horizon, burn_in=burn_in, stride=stride, session_time=begin)
+    summary = prediction_error(prediction, record) | {"session_time": begin}
+    if summary["failed"] == summary["starts"]:
+        raise WorkError(f"{model}: none of {summary['starts']} predictions is finite: the model runs away on {log}")
     write_prediction(prediction, out)
-    summary = prediction_error(prediction, record)
-    click.echo(
-        f"{summary['starts']} starts, {summary['compared']} of them with a pose after {summary['seconds']:.4g} s"
-    )
-    if summary["compared"]:
-        errors = f"{summary['position_median']:.4g} m and {summary['heading_median']:.4g} rad"
-        click.echo(f"error there, median: {errors}")
+    for line in _told(summary, robot, session_time is not None, known):
+        click.echo(line)
     wrote(out)
     write_json(summary, json_file)
+
+
+def _told(summary, robot, given: bool, known: bool) -> list[str]:
+    """What the terminal says of predictions."""
+    from jaxident.effects.catalogue import CATALOGUE
+
+    lines = [f"{summary['starts']} starts, {summary['compared']} of them with a pose after {summary['seconds']:.4g} s"]
+    if summary["compared"]:
+        rms, median, expected = (
+            f"{1e3 * summary[f'position_{kind}']:.3g} mm and {1e3 * summary[f'heading_{kind}']:.3g} mrad"
+            for kind in ("rms", "median", "expected")
+        )
+        lines.append(f"error there: {rms} root mean square, {median} median; {expected} expected, camera error apart")
+    if summary["run_up"]:
+        lines.append(f"{summary['run_up']} starts from a run-up of earlier commands: the filter did not converge there")
+    if summary["failed"]:
+        lines.append(f"{summary['failed']} predictions are not finite and count in no error")
+    if any(CATALOGUE[effect.name].site == "time" for effect in robot.effects):
+        where = (
+            "as told" if given else "where the model's own logs have it" if known else "right after the model's logs"
+        )
+        lines.append(f"effects that drift: the log begins at session time {summary['session_time']:.4g} s, {where}")
+    return lines

@@ -15,8 +15,8 @@ from jaxident.diagnosis.causes.scores import sizes_of
 from jaxident.diagnosis.causes.search import Solution, refit
 from jaxident.diagnosis.causes.sets import one_more
 from jaxident.diagnosis.causes.unexplained import unexplained
-from jaxident.diagnosis.motion.coordinates import COORDINATES, NOMINAL, PLACES, free_places, neutral_vector
 from jaxident.diagnosis.motion.responses import respond
+from jaxident.effects.coordinates import COORDINATES, NOMINAL, PLACES, free_places, neutral_vector
 
 BEST = 4
 """Sets of either search that are tried on the other's logs as well."""

@@ -5,17 +5,20 @@ from math import isfinite
 from typing import NamedTuple
 
 from jaxident.diagnosis import translate
+from jaxident.diagnosis.account.account import Account
+from jaxident.diagnosis.account.measure import Gap, measure
+from jaxident.diagnosis.account.models import as_model
+from jaxident.diagnosis.account.shrink import Shrink
+from jaxident.diagnosis.account.where import Place
 from jaxident.diagnosis.causes.candidates import ENOUGH, Finding
 from jaxident.diagnosis.causes.direct import direct_effects, direct_evidence, present
-from jaxident.diagnosis.extent.measure import Gap, measure
-from jaxident.diagnosis.extent.shrink import Shrink
-from jaxident.diagnosis.extent.where import Place
-from jaxident.diagnosis.motion.coordinates import ASIDE, PLACES
 from jaxident.diagnosis.prepare import Prepared, prepare
 from jaxident.diagnosis.repair import search
 from jaxident.diagnosis.replay import Replay, answers, replay, visible
 from jaxident.diagnosis.simulator import Simulator, as_simulator, check_units, inspect_simulator, shared
+from jaxident.diagnosis.translate import to_model
 from jaxident.diagnosis.verdict import Judgement, judge
+from jaxident.effects.coordinates import ASIDE, PLACES
 from jaxident.errors import InputError
 from jaxident.log import Log
 from jaxident.numerics import require_float64
@@ -37,13 +40,15 @@ class Parameter(NamedTuple):
 
 
 class Diagnosis(NamedTuple):
-    """What `diagnose` found. verdict: "no_gap", "parameters", "effects", "unknown" or "undecided". visible: the gain
-    that each effect of typical size would have had; below ENOUGH this input could not have shown it. replay: what faint
-    effects come out as. surplus: effects that the user's simulator has and the robot has not."""
+    """What `diagnose` found. verdict: "no_gap", "parameters", "effects", "partly", "unknown" or "undecided". selected:
+    the named effects, in the order in which they were accepted. visible: the gain that each effect of typical size
+    would have had; below ENOUGH this input could not have shown it. replay: what faint effects come out as. surplus:
+    effects that the user's simulator has and the robot has not."""
 
     verdict: str
     judgement: Judgement
     gap: Gap
+    account: Account
     where: Place
     selected: tuple[str, ...]
     parameters: list[Parameter]
@@ -60,8 +65,8 @@ class Diagnosis(NamedTuple):
 
     @property
     def not_testable(self) -> list[str]:
-        """Effects that this input could not have shown at their typical size."""
-        return [name for name, gain in self.visible.items() if gain < ENOUGH]
+        """Effects that this input could not have shown at their typical size, and that are not among the named."""
+        return [name for name, gain in self.visible.items() if gain < ENOUGH and name not in self.selected]
 
 
 def diagnose(
@@ -76,9 +81,9 @@ def diagnose(
 
     The nominal model is `model`, or the one behind the logs `sim` of the user's own simulator, or identified from the
     logs. Effects that a model or simulator has are no gap: the answer is what the robot has and it lacks. horizon [s]
-    (default 1, of 20 to 60 rows). The runs keep apart: every third, from the second on, serves the gap and its shrink
-    alone. seed: of the replays of noise and the shuffles behind intervals; nothing else is drawn. Needs double
-    precision and a minute. InputError for logs that say nothing, and for a simulator in other units."""
+    (default 1, of 20 to 60 rows). The runs keep apart: every third, from the second on, serves the gap, its account and
+    its shrink alone. seed: of the laws of noise drawn and the shuffles behind intervals; nothing else is drawn. Needs
+    double precision and a minute. InputError for logs that say nothing, and for a simulator in other units."""
     require_float64("diagnose")
     check_nominal(logs, sim, model)
     simulator = None if model is None else as_simulator(model, logs)
@@ -90,18 +95,18 @@ def diagnose(
     extra = direct_evidence(prepared, finding, ENOUGH if simulator is None else simulator.price)
     shown = present(finding, extra)
     common, surplus = shared(shown, simulator)
-    selected = tuple(name for name in shown if name not in common)
-    gap, where, shrinks = measure(prepared, finding, told, common, seed)
+    direct = direct_effects(prepared, finding, shown)
+    given = None if simulator is None else as_model(prepared, simulator.vector, finding.law, simulator.effects, direct)
+    gap, account, where, shrinks, corrected = measure(prepared, finding, given, common, direct, seed)
     judgement = judge(finding, gap, extra, simulator, values)
+    selected = tuple(name for name in shown if name not in common) if judgement.none < 0.5 else ()
     known = answers(finding.data, finding.nominal, prepared.largest)
     parameters = compare_parameters(prepared, finding, told, common)
-    verdict = decide(prepared, judgement, parameters)
-    best, direct = finding.candidates[finding.selected].solution, direct_effects(prepared, finding, shown)
-    corrected = translate.to_model(prepared, best, finding.law, finding.selected, direct)
-    nominal = translate.to_model(prepared, finding.nominal, finding.law, ())
-    return Diagnosis(verdict, judgement, gap, where, selected if verdict == "effects" else (), parameters,
-                     visible(known), replay(known, seed), advice(verdict, judgement), nominal, corrected, shrinks,
-                     prepared, finding, surplus, simulator)  # fmt: skip
+    verdict = decide(prepared, judgement, selected, parameters)
+    nominal = to_model(prepared, finding.nominal.vector, finding.law, (), None, finding.nominal)
+    return Diagnosis(verdict, judgement, gap, account, where, selected, parameters, visible(known),
+                     replay(known, seed), advice(verdict, judgement), nominal, corrected, shrinks, prepared, finding,
+                     surplus, simulator)  # fmt: skip
 
 
 def check_nominal(logs: Log | Sequence[Log], sim: Log | Sequence[Log] | None, model: Model | None) -> None:
@@ -138,14 +143,14 @@ def _finite(value: float) -> float | None:
     return value if isfinite(value) else None
 
 
-def decide(prepared: Prepared, judgement: Judgement, parameters: list[Parameter]) -> str:
+def decide(prepared: Prepared, judgement: Judgement, selected: tuple[str, ...], parameters: list[Parameter]) -> str:
     """The verdict."""
-    if prepared.naming.sum() < FEW or (~prepared.naming).sum() < FEWEST:
+    if len(prepared.windows.run) < FEW or len(prepared.judging.row) < FEWEST:
         return "undecided"
-    if judgement.unknown > 0.5:
+    if selected:
+        return "partly" if judgement.unexplained > 0.5 else "effects"
+    if judgement.unexplained > 0.5:
         return "unknown"
-    if judgement.none < 0.5:
-        return "effects"
     apart = [
         abs(p.refitted - p.nominal) / max(p.standard_deviation, 1e-12) for p in parameters if p.nominal is not None
     ]
@@ -158,10 +163,10 @@ def advice(verdict: str, judgement: Judgement) -> str:
     if verdict == "undecided":
         return "Record at least three runs of 500 samples with both wheels at many levels, forward and backward."
     sets = [cause for cause in judgement.causes if cause.indistinguishable_from]
-    if verdict == "effects" and sets:
+    if verdict in ("effects", "partly") and sets:
         names = ",".join((sets[0].effect, sets[0].indistinguishable_from[0]))
         told = names.replace(",", " from ")
         return f"This input cannot tell {told}: record the one that `jaxident plan MODEL --between {names}` designs."
-    if verdict == "unknown":
-        return "No effect of the catalogue explains the gap: record runs that stay in the regions where it lies."
+    if verdict in ("unknown", "partly"):
+        return "No effect of the catalogue explains what is left: record runs that stay in the regions where it lies."
     return "Nothing more is needed for this question; a longer log would find fainter effects."

@@ -7,7 +7,7 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.search import Solution
 from jaxident.diagnosis.motion.windows import Windows
-from jaxident.log import Log
+from jaxident.log import Log, repeats
 
 OUTLYING, LESS_OUTLYING = 7.0, 4.5
 """Standard deviations by which a pose leaves those nearby before it is an outlier; fewer suffice where a log is known
@@ -15,31 +15,28 @@ to have outliers, for not all are large."""
 FEW, RARE = 3, 1e-3
 """Outliers, and their part of all rows, from which on a log is known to have some: of one in two thousand, as a real
 robot that jerks may leave, nothing more is made."""
+REPEATED = 0.3
+"""Part of all rows from which on repeats are those of a camera without noise, at a robot that rests."""
 TAIL = 2.2
 """What nine tenths of normal deviations from the median of five are below, in units of their median over 0.6745; the
 median itself is next to nothing where a model's misses are smooth, for then most rows are the median of their five."""
 
 
 class Frames(NamedTuple):
-    """Poses that are no measurement of their time, boolean (rows of the log,): exact repeats, and outliers."""
+    """Poses that are no measurement of their time, boolean (rows of the log,): exact repeats, and outliers; the sizes
+    of the latter, root mean square in position [m], each axis, and heading [rad]; how many poses were looked at."""
 
     frozen: Any
     outlying: Any
+    sizes: tuple[float, float] = (0.0, 0.0)
+    poses: int = 0
 
 
 def find_repeats(log: Log) -> np.ndarray:
-    """Rows whose pose equals the one before in all three numbers: a camera with noise never measures that."""
-    pose = np.stack([log.x, log.y, log.theta])
-    same = np.concatenate([[False], np.all(pose[:, 1:] == pose[:, :-1], axis=0)])
-    same &= np.concatenate([[False], np.asarray(log.run)[1:] == np.asarray(log.run)[:-1]])
-    noisy = np.mean(same) < 0.3
-    return same & noisy
-
-
-def blind(log: Log, rows: Array) -> Log:
-    """The log without the poses of some rows."""
-    x, y, theta = (np.where(rows, np.nan, column) for column in log.pose)
-    return log._replace(x=x, y=y, theta=theta)
+    """Rows whose pose repeats the one before, unless so many do that the camera has no noise: one with noise never
+    measures that."""
+    same = repeats(log)
+    return same & (np.mean(same) < REPEATED)
 
 
 def find_outliers(log: Log, windows: Windows, solution: Solution) -> np.ndarray:
@@ -54,7 +51,7 @@ def find_outliers(log: Log, windows: Windows, solution: Solution) -> np.ndarray:
     lonely = (np.abs(middle) > OUTLYING * spread) & (apart < 0.5 * np.abs(middle))
     window, row = np.nonzero(lonely.any(axis=2) & whole)
     found = np.zeros(len(log.t), bool)
-    found[_places(log, windows)[window] + row + 1] = True
+    found[windows.row[window] + row + 1] = True
     return found
 
 
@@ -68,20 +65,30 @@ def find_more_outliers(log: Log, windows: Windows, solution: Solution) -> np.nda
     spread = np.quantile(np.abs(apart), 0.9, axis=0) / TAIL
     hit = ((np.abs(apart) > LESS_OUTLYING * spread) & (near < 0.25 * np.abs(apart))).any(axis=1)
     found = np.zeros(len(log.t), bool)
-    places = _places(log, windows)
-    found[np.concatenate([place + k for place, k in zip(places, rows, strict=True)])[hit]] = True
+    found[np.concatenate([place + k for place, k in zip(windows.row, rows, strict=True)])[hit]] = True
     return found
 
 
-def has_outliers(outlying: Array) -> bool:
-    """Whether outliers, boolean (rows,), are enough to call a log one that has some."""
-    return bool(outlying.sum() >= max(FEW, RARE * len(outlying)))
+def has_outliers(outlying: Array, poses: int) -> bool:
+    """Whether outliers, boolean (rows,), are enough to call a log of so many poses one that has some."""
+    return bool(outlying.sum() >= max(FEW, RARE * poses))
 
 
-def _places(log: Log, windows: Windows) -> np.ndarray:
-    """The row of the log at which each window begins."""
-    begins = np.flatnonzero(np.concatenate([[True], np.asarray(log.run)[1:] != np.asarray(log.run)[:-1]]))
-    return begins[windows.run] + windows.first
+def frames_of(log: Log, frozen: Array, outlying: Array) -> Frames:
+    """What was found in a log whose repeats are blind already."""
+    seen = np.isfinite(np.stack(log.pose)).all(axis=0)
+    kept, rows = np.flatnonzero(seen & ~outlying), np.flatnonzero(outlying)
+    poses = int(seen.sum() + frozen.sum())
+    if not len(rows) or not len(kept):
+        return Frames(frozen, outlying, poses=poses)
+    apart = []
+    for k, column in enumerate(log.pose):
+        values = np.unwrap(np.asarray(column)[kept]) if k == 2 else np.asarray(column)[kept]
+        apart.append(np.asarray(column)[rows] - np.interp(rows, kept, values))
+    x, y, turn = apart
+    turn = turn - 2.0 * np.pi * np.round(turn / (2.0 * np.pi))
+    sizes = float(np.sqrt(np.mean(x**2 + y**2) / 2.0)), float(np.sqrt(np.mean(turn**2)))
+    return Frames(frozen, outlying, sizes, poses)
 
 
 def _beside(values: Array) -> tuple[np.ndarray, np.ndarray]:

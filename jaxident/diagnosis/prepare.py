@@ -9,18 +9,27 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.lost import Lost
 from jaxident.diagnosis.causes.search import Data, Solution, refit
-from jaxident.diagnosis.frames import Frames, blind, find_more_outliers, find_outliers, find_repeats, has_outliers
-from jaxident.diagnosis.motion.coordinates import neutral_vector, nominal_vector
+from jaxident.diagnosis.frames import (
+    Frames,
+    find_more_outliers,
+    find_outliers,
+    find_repeats,
+    frames_of,
+    has_outliers,
+)
 from jaxident.diagnosis.motion.linear import START_STATES
 from jaxident.diagnosis.motion.responses import respond
-from jaxident.diagnosis.motion.windows import Windows, cut, take
+from jaxident.diagnosis.motion.windows import Piece, Windows, cut, take
 from jaxident.diagnosis.noise.law import Law, first_law, white_whitener
 from jaxident.diagnosis.noise.sizing import size_noise
+from jaxident.diagnosis.roles import split
+from jaxident.effects.coordinates import neutral_vector, nominal_vector
 from jaxident.errors import InputError
 from jaxident.estimation.checks import check_informative
 from jaxident.estimation.maximum_likelihood import begin
 from jaxident.estimation.runs import stack_runs
-from jaxident.log import Log, join
+from jaxident.estimation.stretches import Starts
+from jaxident.log import Log, blind, join, run_begins
 from jaxident.robot.drive import Physical
 
 BURN = 20
@@ -34,15 +43,20 @@ HORIZON = 1.0
 
 
 class Prepared(NamedTuple):
-    """The log with commands over `largest`; windows; which of them name, boolean (windows,), the others only judge the
-    gap; horizon [s] and its rows; the nominal fit and noise law from the windows that name; the share of commands that
-    never arrived, and the gain of saying so: commands are those that did, those `sent` (rows of a run, runs, 2) are
-    kept beside them."""
+    """What fits, and what judges alone.
+
+    log: in the user's units, poses as they were measured. largest: the command that the search has as its unit.
+    windows: those that fit and name, commands over `largest`; frames: of the rows that they were cut from. judging:
+    rows from which predictions are judged, `rows` rows or horizon [s] ahead, none of which the windows saw beyond.
+    nominal, law: the nominal fit and the noise law. lost: the share of commands that never arrived, and the gain of
+    saying so; the windows' commands are then those that did, those `sent` (rows of a piece, pieces, 2) are kept.
+    """
 
     log: Log
     largest: float
     windows: Windows
-    naming: Any
+    judging: Starts
+    rows: int
     horizon: float
     frames: Frames
     nominal: Solution
@@ -52,53 +66,58 @@ class Prepared(NamedTuple):
 
 
 def prepare(
-    logs, horizon: float | None, nominal: Array | None = None, like: "Prepared | None" = None, law: Law | None = None
+    logs,
+    horizon: float | None,
+    nominal: Array | None = None,
+    like: "Prepared | None" = None,
+    law: Law | None = None,
 ) -> Prepared:
     """Windows, roles and the nominal fit; `nominal` (10,) is where its search begins, from the data alone without.
 
-    With `like` the commands are scaled as there, and with `law` the noise is taken for that: logs of a simulator, often
-    free of noise, are judged by what the robot's camera could see. InputError where the log says nothing: no motion, no
-    excitation, too few poses.
+    With `like` the commands are scaled as there, and with `law` the noise is taken for that: logs of a simulator that
+    are free of noise are judged by what the robot's camera could see, and none of their runs is kept apart.
+    InputError where the log says nothing: no motion, no excitation, too few poses.
     """
-    log = join(logs)
-    check_informative(log)
-    largest = float(np.nanmax(np.abs(np.stack(log.command)))) if like is None else like.largest
-    log = log._replace(u_r=np.asarray(log.u_r) / largest, u_l=np.asarray(log.u_l) / largest)
-    frozen = find_repeats(log) if law is None else np.zeros(len(log.t), bool)
-    log = blind(log, frozen)
+    given = join(logs)
+    check_informative(given)
+    largest = float(np.nanmax(np.abs(np.stack(given.command)))) if like is None else like.largest
+    log = given._replace(u_r=np.asarray(given.u_r) / largest, u_l=np.asarray(given.u_l) / largest)
     period = float(np.median(np.concatenate([np.diff(run.t) for run in log.runs()])))
     rows, horizon = horizon_rows(horizon, period)
-    windows = stretches(log, BURN + rows)
-    naming = roles(windows)
-    if not naming.any() or naming.all():
+    roles = split(log, BURN + rows)
+    pieces = roles.fit if law is None else sorted([*roles.fit, *roles.judge], key=lambda p: (p.run, p.first))
+    judging = judging_starts(log, roles.judge, rows)
+    fitted = only(log, pieces)
+    frozen = find_repeats(fitted) if law is None else np.zeros(len(log.t), bool)
+    fitted = blind(fitted, frozen)
+    windows = stretches(fitted, BURN + rows, pieces)
+    if like is None and not len(judging.row):
         raise InputError(
-            f"{len(log.t)} rows make {len(naming)} windows of {BURN + rows} rows: too few to name and to judge; "
-            "record longer runs, or three of them"
+            f"{len(log.t)} rows make {len(windows.run)} windows of {BURN + rows} rows and none to judge by: record "
+            "longer runs, or three of them"
         )
-    vector = neutral_vector(starting_point(log) if nominal is None else nominal)
-    first = rough_fit(windows, naming, vector, law)
+    vector = neutral_vector(starting_point(fitted, pieces) if nominal is None else nominal)
+    first = rough_fit(windows, vector, law)
+    here = given, largest
     if law is not None:
-        return Prepared(log, largest, windows, naming, horizon, Frames(frozen, frozen), first, law)
-    outlying = find_outliers(log, windows, first)
+        return Prepared(*here, windows, judging, rows, horizon, Frames(frozen, frozen), first, law)
+    outlying = find_outliers(fitted, windows, first)
     if outlying.any():
-        windows, naming, first = without_rows(log, outlying, first)
-    if has_outliers(outlying):
-        outlying |= find_more_outliers(blind(log, outlying), windows, first)
-        windows, naming, first = without_rows(log, outlying, first)
+        windows, first = without_rows(fitted, outlying, first, pieces)
+    if has_outliers(outlying, int(np.isfinite(fitted.x).sum())):
+        outlying |= find_more_outliers(blind(fitted, outlying), windows, first)
+        windows, first = without_rows(fitted, outlying, first, pieces)
     responses = respond(np.exp(first.vector[:2]), first.linear.residual, windows)
-    law = size_noise(first.linear.residual, first.linear.starts, windows, responses, naming)
-    return Prepared(log, largest, windows, naming, horizon, Frames(frozen, outlying), first, law)
+    law = size_noise(first.linear.residual, first.linear.starts, windows, responses)
+    return Prepared(*here, windows, judging, rows, horizon, frames_of(fitted, frozen, outlying), first, law)
 
 
 def repaired(prepared: Prepared, lost: Lost, worth: float) -> Prepared:
     """With the commands that arrived in place of those that were sent, which is worth some gain."""
-    log = prepared.log
-    arrived = np.concatenate([lost.arrived[: len(run.t), k] for k, run in enumerate(log.runs())])
-    log = log._replace(u_r=arrived[:, 0], u_l=arrived[:, 1])
     windows = prepared.windows._replace(command=lost.arrived)
     share, gain = prepared.lost
     sent = prepared.windows.command if prepared.sent is None else prepared.sent
-    return prepared._replace(log=log, windows=windows, lost=(share + lost.share, gain + worth), sent=sent)
+    return prepared._replace(windows=windows, lost=(share + lost.share, gain + worth), sent=sent)
 
 
 def horizon_rows(horizon: float | None, period: float) -> tuple[int, float]:
@@ -115,10 +134,38 @@ def horizon_rows(horizon: float | None, period: float) -> tuple[int, float]:
     return rows, rows * period
 
 
-def starting_point(log: Log) -> np.ndarray:
-    """The nominal coordinates (10,) that the starter of the likelihood finds."""
-    runs = jax.tree.map(jnp.asarray, stack_runs(log))
-    found = begin(runs, jnp.asarray(0.9)).estimate
+def only(log: Log, pieces: list[Piece]) -> Log:
+    """The log without the poses of rows that no piece holds."""
+    begins = run_begins(log)
+    kept = np.zeros(len(log.t), bool)
+    for piece in pieces:
+        kept[begins[piece.run] + piece.first : begins[piece.run] + piece.last] = True
+    return blind(log, ~kept)
+
+
+def judging_starts(log: Log, pieces: list[Piece], rows: int) -> Starts:
+    """Rows from which some rows ahead are judged: every `rows` rows of a piece from BURN on, or the last that its end
+    allows, where FEWEST poses show the start and there is one to compare with."""
+    found = []
+    for piece in pieces:
+        run = log.runs()[piece.run]
+        seen = np.isfinite(np.stack(run.pose)).all(axis=0)
+        last = piece.last - 1 - rows
+        starts = np.arange(max(piece.first, BURN), last + 1, rows) if last >= BURN else np.array([last])
+        found += [
+            (piece.run, start)
+            for start in starts[starts >= FEWEST]
+            if seen[max(start + 1 - BURN, 0) : start + 1].sum() >= FEWEST and seen[start + rows]
+        ]
+    run, row = np.array(found, int).reshape(-1, 2).T
+    return Starts(run, row)
+
+
+def starting_point(log: Log, pieces: list[Piece]) -> np.ndarray:
+    """The nominal coordinates (10,) that the starter of the likelihood finds in some pieces."""
+    runs = log.runs()
+    own = join([runs[piece.run].rows(piece.first, piece.last) for piece in pieces])
+    found = begin(jax.tree.map(jnp.asarray, stack_runs(own)), jnp.asarray(0.9)).estimate
     drive = Physical(np.asarray(found.rate), np.asarray(found.gain))
     point = nominal_vector(drive, np.asarray(found.dead_zone))
     if not np.all(np.isfinite(point)) or abs(np.linalg.det(np.asarray(found.gain))) < 1e-9:
@@ -126,10 +173,10 @@ def starting_point(log: Log) -> np.ndarray:
     return point
 
 
-def rough_fit(windows: Windows, naming: Array, vector: Array, law: Law | None = None) -> Solution:
+def rough_fit(windows: Windows, vector: Array, law: Law | None = None) -> Solution:
     """The nominal fit for white camera noise, of a law or as fourth differences size it."""
     law = first_law(windows) if law is None else law
-    return refit(Data(windows, white_whitener(law, windows), naming), vector, first_starts(windows), (), most=6)
+    return refit(Data(windows, white_whitener(law, windows)), vector, first_starts(windows), (), most=6)
 
 
 def first_starts(windows: Windows) -> np.ndarray:
@@ -149,19 +196,10 @@ def first_starts(windows: Windows) -> np.ndarray:
     return starts
 
 
-def roles(windows: Windows) -> np.ndarray:
-    """Windows that name, boolean (windows,); the others, every third run from the second on, only judge the gap.
-
-    Of one or two runs it is stretches of four windows, so that both purposes see early and late.
-    """
-    order = windows.run if len(np.unique(windows.run)) >= 3 else np.arange(len(windows.run)) // 2
-    return order % 3 != 1
-
-
-def stretches(log: Log, rows: int) -> Windows:
+def stretches(log: Log, rows: int, pieces: list[Piece]) -> Windows:
     """Windows of some rows that show their start. Where a second without poses comes first, the speed before is a
     guess: one far off bends a whole fit, or leaves what no number can hold. InputError where there are none."""
-    windows = cut(log, rows)
+    windows = cut(log, rows, pieces=pieces)
     shown = np.flatnonzero(shows_start(windows))
     if not len(shown):
         raise InputError(f"no stretch of {rows} rows has {FEWEST} poses among its first {BURN}")
@@ -173,8 +211,7 @@ def shows_start(windows: Windows) -> np.ndarray:
     return np.sum(windows.seen[:BURN], axis=0) >= FEWEST
 
 
-def without_rows(log: Log, rows: Array, fit: Solution) -> tuple[Windows, np.ndarray, Solution]:
-    """Windows, roles and the nominal fit without the poses of some rows, windows as long as those of a fit."""
-    windows = stretches(blind(log, rows), fit.linear.residual.shape[1] // 3)
-    naming = roles(windows)
-    return windows, naming, rough_fit(windows, naming, fit.vector)
+def without_rows(log: Log, rows: Array, fit: Solution, pieces: list[Piece]) -> tuple[Windows, Solution]:
+    """Windows and the nominal fit without the poses of some rows, windows as long as those of a fit."""
+    windows = stretches(blind(log, rows), fit.linear.residual.shape[1] // 3, pieces)
+    return windows, rough_fit(windows, fit.vector)

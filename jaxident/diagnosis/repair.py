@@ -15,7 +15,7 @@ def search(prepared: Prepared, without: Collection[str] = ()) -> tuple[Prepared,
     """The search, and again with the commands that arrived where saying that some were lost is worth more than the
     effects found without: a delay, say, makes every change late, lost commands only some. `without`: effects that the
     catalogue is to lack."""
-    finding = search_effects(prepared.windows, prepared.naming, prepared.nominal, prepared.law, without=without)
+    finding = search_effects(prepared.windows, prepared.nominal, prepared.law, without=without)
     for _ in range(REPAIRS):
         best = finding.candidates[finding.selected]
         alone, beside = (find_lost(finding.data, solution) for solution in (finding.nominal, best.solution))
@@ -24,5 +24,5 @@ def search(prepared: Prepared, without: Collection[str] = ()) -> tuple[Prepared,
         if worth - PENALTY < ENOUGH:
             break
         prepared = repaired(prepared, lost, worth - PENALTY)
-        finding = search_effects(prepared.windows, prepared.naming, prepared.nominal, prepared.law, without=without)
+        finding = search_effects(prepared.windows, prepared.nominal, prepared.law, without=without)
     return prepared, finding

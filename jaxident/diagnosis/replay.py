@@ -12,9 +12,9 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.causes.candidates import ENOUGH, PENALTY
 from jaxident.diagnosis.causes.scores import differences, seeded, sizes_of
 from jaxident.diagnosis.causes.search import Data, Solution
-from jaxident.diagnosis.motion.coordinates import COORDINATES, PLACES, SMOOTH, from_catalogue, unit_factors
 from jaxident.diagnosis.motion.linear import gram, linearise, normal
 from jaxident.effects.catalogue import CATALOGUE
+from jaxident.effects.coordinates import COORDINATES, PLACES, SMOOTH, from_catalogue, unit_factors
 
 FAINT = 40.0
 """Expected gain of the replayed effects: two to three times what a claim asks for."""
@@ -50,8 +50,8 @@ def answers(data: Data, nominal: Solution, largest: float) -> Answers:
     linear = linearise(nominal.vector, nominal.starts, data.windows, [*nominal.places, *places])
     sizes = {name: _typical(name, largest, duration) for name in COORDINATES}
     change = differences(data, nominal, [seeded(nominal.vector, name, size) for name, size in sizes.items()])
-    columns = np.concatenate([linear.slopes, change], axis=2)[data.use]
-    products = gram(data.whitener[data.use], columns, linear.starts[data.use]).products.sum(axis=0)
+    columns = np.concatenate([linear.slopes, change], axis=2)
+    products = gram(data.whitener, columns, linear.starts).products.sum(axis=0)
     order = {place: k for k, place in enumerate(places)}
     typical = {name: len(places) + k for k, name in enumerate(COORDINATES)}
     own = {name: [order[p] for p in smooth[name]] if name in smooth else [typical[name]] for name in COORDINATES}

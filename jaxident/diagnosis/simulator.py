@@ -5,18 +5,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from jaxident.diagnosis.account.measure import measure
 from jaxident.diagnosis.causes.candidates import ENOUGH, Finding
-from jaxident.diagnosis.causes.direct import direct_effects, direct_evidence
+from jaxident.diagnosis.causes.direct import direct_effects, direct_evidence, present
 from jaxident.diagnosis.causes.lost import gain_beyond
 from jaxident.diagnosis.causes.search import refit
 from jaxident.diagnosis.causes.which import search_effects
 from jaxident.diagnosis.common import MOSTLY, Values, explain_together
-from jaxident.diagnosis.extent.measure import measure
 from jaxident.diagnosis.noise.law import Law, deviations, first_law
 from jaxident.diagnosis.prepare import Prepared, prepare
 from jaxident.diagnosis.repair import search
-from jaxident.diagnosis.translate import to_coordinates
 from jaxident.effects.checks import check_effects
+from jaxident.effects.coordinates import vector_of
 from jaxident.errors import InputError
 from jaxident.log import Log, join
 from jaxident.robot.model import Model
@@ -121,14 +121,12 @@ def rarer(
 
 def _search(sim: Log | Sequence[Log], prepared: Prepared, finding: Finding) -> tuple[Prepared, Finding, bool]:
     """The search of a simulator's logs: as far as the robot's camera could tell or, where they are as noisy themselves,
-    under their own noise; and whether they are."""
+    under their own noise, some of their runs kept for judging; and whether they are."""
     law, nominal = Law(*deviations(finding.law)[1:]), finding.nominal.vector[:10]
-    own = prepare(sim, None, nominal, prepared, law)
+    own = prepare(sim, prepared.horizon, nominal, prepared, law)
     if is_noisy(first_law(own.windows), finding.law):
-        own = prepare(sim, None, nominal, prepared)
-        mended, found = search(own._replace(naming=np.ones(len(own.naming), bool)))
-        return mended._replace(naming=own.naming), found, True
-    return own, search_effects(own.windows, np.ones(len(own.naming), bool), own.nominal, law, sized=False), False
+        return *search(prepare(sim, prepared.horizon, nominal, prepared)), True
+    return own, search_effects(own.windows, own.nominal, law, sized=False), False
 
 
 def is_noisy(white: Law, robot: Law) -> bool:
@@ -139,17 +137,22 @@ def is_noisy(white: Law, robot: Law) -> bool:
 
 
 def _excess(own: Prepared, found: Finding) -> float:
-    """How far a simulator's own gap exceeds its noise; 0 where its logs are too short to tell."""
-    try:
-        return measure(own, found, None, ())[0].excess
-    except InputError:
+    """How far a simulator's own gap exceeds its noise, on runs that it was not fitted to; 0 where there are none."""
+    if not len(own.judging.row):
         return 0.0
+    direct = direct_effects(own, found, present(found, direct_evidence(own, found)))
+    return measure(own, found, None, (), direct).gap.excess
 
 
 def as_simulator(model: Model, logs: Log | Sequence[Log]) -> Simulator:
     """A model as the simulator of some logs' commands. InputError for effects that `check_effects` refuses."""
     check_effects(model.effects)
-    return Simulator(to_coordinates(model, logs), tuple(effect.name for effect in model.effects))
+    return Simulator(vector_of(model, largest_command(logs)), tuple(effect.name for effect in model.effects))
+
+
+def largest_command(logs: Log | Sequence[Log]) -> float:
+    """The largest command of some logs, which the search has as its unit."""
+    return float(np.nanmax(np.abs(np.stack(join(logs).command))))
 
 
 def shared(found: tuple[str, ...], simulator: Simulator | None) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -1,51 +1,26 @@
 """Between the coordinates of a search, for commands over their largest, and models in the user's unit."""
 
-from collections.abc import Sequence
-from typing import Any
-
 import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.search import Solution
-from jaxident.diagnosis.motion.coordinates import (
+from jaxident.diagnosis.noise.law import Law, deviations
+from jaxident.diagnosis.prepare import Prepared
+from jaxident.effects.coordinates import (
     ASIDE,
+    COMMAND_POWERS,
     COORDINATES,
     NOMINAL,
     PLACES,
-    from_catalogue,
     limits,
     natural,
-    neutral_vector,
-    nominal_vector,
     to_catalogue,
     unit_factors,
 )
-from jaxident.diagnosis.noise.law import Law
-from jaxident.diagnosis.prepare import Prepared
-from jaxident.effects.catalogue import by_name, to_vector
-from jaxident.log import Log, join
+from jaxident.estimation.session import with_session
 from jaxident.robot.drive import Physical
-from jaxident.robot.model import Effect, Model, Provenance, require_physical
+from jaxident.robot.model import Effect, Model, Provenance
 from jaxident.robot.noise import Noise
-
-_POWERS = np.array([0, 0, -1, -1, -1, -1, 1, 1, 0, 0])
-"""How the nominal parameters scale with the unit of the command."""
-
-
-def to_coordinates(model: Model, logs: Log | Sequence[Log]) -> np.ndarray:
-    """The coordinates (SIZE,) of a model, its effects included, for the commands of some logs over their largest; what
-    is random in it has none."""
-    drive = require_physical(model)
-    largest = float(np.nanmax(np.abs(np.stack(join(logs).command))))
-    point = nominal_vector(drive, np.asarray(model.dead_zone))
-    vector = neutral_vector(np.concatenate([point[:2], point[2:] / largest ** _POWERS[2:]]))
-    whole = by_name(np.asarray(to_vector(model.effects)))
-    for name in (effect.name for effect in model.effects if effect.name in COORDINATES):
-        factors = unit_factors(name, largest)
-        values = from_catalogue(name, {key: float(v) / factors[key] for key, v in whole[name].items()})
-        for key, value in values.items():
-            vector[PLACES[name, key]] = value
-    return vector
 
 
 def abreast_of_marker(vector: Array) -> np.ndarray:
@@ -63,12 +38,12 @@ def abreast_of_marker(vector: Array) -> np.ndarray:
 
 def in_user_units(point: Array, largest: float) -> list[float]:
     """Nominal parameters in the order of NOMINAL from coordinates for commands over `largest`."""
-    return (natural(point) * float(largest) ** _POWERS).tolist()
+    return (natural(point) * float(largest) ** COMMAND_POWERS).tolist()
 
 
 def parameters_of(solution: Solution, largest: float) -> tuple[tuple[str, ...], list[float], list[float]]:
     """Names, values and standard deviations of the nominal parameters in the user's unit."""
-    factor = float(largest) ** _POWERS
+    factor = float(largest) ** COMMAND_POWERS
     values = natural(solution.vector) * factor
     slope = np.concatenate([np.exp(solution.vector[:2]), np.ones(8)]) * factor
     deviation = np.sqrt(np.diagonal(solution.covariance)[:10]) * np.abs(slope)
@@ -106,33 +81,69 @@ def effect_values(name: str, vector: Array, largest: float) -> dict[str, float]:
 
 
 def to_model(
-    prepared: Prepared, solution: Solution, law: Law, effects: tuple[str, ...], direct: dict[str, dict] | None = None
+    prepared: Prepared,
+    vector: Array,
+    law: Law,
+    effects: tuple[str, ...],
+    direct: dict[str, dict] | None = None,
+    fit: Solution | None = None,
 ) -> Model:
-    """A solution as a model with its noise law and effects, `direct` ones by their parameters. Limits that never act
-    are left out."""
-    _, values, _ = parameters_of(solution, prepared.largest)
+    """Coordinates (SIZE,) as a model with its noise law and effects, `direct` ones by their parameters; with the
+    deviations and the covariance of a fit where one is given. Limits that never act are left out."""
+    values = in_user_units(vector, prepared.largest)
     steps = np.concatenate([np.diff(run.t) for run in prepared.log.runs()])
-    found = [effect_of(name, solution, prepared.largest) for name in effects]
+    found = [_effect(name, vector, prepared.largest, fit) for name in effects]
     found = [effect for effect in found if np.all(np.isfinite(list(effect.parameters.values())))]
+    order, covariance = ((), None) if fit is None else covariance_of(fit, found, prepared.largest)
     found += [Effect(name, dict(parameters)) for name, parameters in (direct or {}).items()]
-    coupling: Any = np.array(values[8:10])
     return Model(
         float(np.median(steps)),
-        Physical(np.array(values[:2]), np.array(values[2:6]).reshape(2, 2), coupling),
+        Physical(np.array(values[:2]), np.array(values[2:6]).reshape(2, 2), np.array(values[8:10])),
         np.array(values[6:8]),
-        noise=noise_of(law),
+        noise=noise_of(law, "coloured_noise" in (direct or {})),
         effects=tuple(found),
-        provenance=Provenance(method="diagnosis"),
+        covariance=covariance,
+        parameter_order=order,
+        provenance=with_session(Provenance(method="diagnosis"), prepared.log),
     )
 
 
-def noise_of(law: Law) -> Noise:
-    """A law as a model's noise: slip as a white acceleration of equal power at low frequency."""
-    slip = law.slip or (0.0, 0.0)
-    density = float(np.sqrt(2.0 * law.slip_time)) if law.slip_time else 0.0
-    return Noise(law.position, law.heading, None, slip[0] * density, slip[1] * density)
+def _effect(name: str, vector: Array, largest: float, fit: Solution | None) -> Effect:
+    return Effect(name, effect_values(name, vector, largest)) if fit is None else effect_of(name, fit, largest)
+
+
+def covariance_of(fit: Solution, effects: list[Effect], largest: float) -> tuple[tuple[str, ...], np.ndarray]:
+    """Names and covariance of the parameters of a fit in the user's units, those of effects as effect.parameter; to
+    first order, without those that were looked for on a grid alone."""
+    names = [*NOMINAL, *(f"{effect.name}.{key}" for effect in effects for key in effect.parameters)]
+
+    def values(vector: Array) -> np.ndarray:
+        own = [effect_values(effect.name, vector, largest) for effect in effects]
+        return np.array([*in_user_units(vector, largest), *(value for each in own for value in each.values())])
+
+    columns, here = [], values(fit.vector)
+    for place in fit.places:
+        step, moved = 1e-6 * max(abs(fit.vector[place]), 1e-3), np.array(fit.vector)
+        moved[place] += step
+        columns.append((values(moved) - here) / step)
+    slope = np.stack(columns, axis=1)
+    told = np.any(slope != 0.0, axis=1)
+    matrix = slope[told] @ fit.covariance @ slope[told].T
+    return tuple(name for name, kept in zip(names, told, strict=True) if kept), matrix
+
+
+def noise_of(law: Law, apart: bool = False) -> Noise:
+    """A law as a model's noise; apart: the camera's memory is told as an effect."""
+    slip, time = law.slip or (0.0, 0.0), law.slip_time
+    density = float(np.sqrt(2.0 * time)) if time else 0.0
+    slipping = {"slip_along": slip[0] * density, "slip_heading": slip[1] * density, "slip_time": time or None}
+    if law.coloured is None or apart:
+        return Noise(law.position, law.heading, None, **slipping)
+    _, position, heading = deviations(law).tolist()
+    return Noise(position, heading, law.coloured_time, white_position=law.position, white_heading=law.heading,
+                 **slipping)  # fmt: skip
 
 
 def scaled(point: Array, largest: float) -> np.ndarray:
     """Nominal coordinates for commands over `largest` as those in the user's unit."""
-    return np.concatenate([point[:2], point[2:10] * float(largest) ** _POWERS[2:]])
+    return np.concatenate([point[:2], point[2:10] * float(largest) ** COMMAND_POWERS[2:]])

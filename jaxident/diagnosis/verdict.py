@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from jaxident.diagnosis.account.measure import Gap
 from jaxident.diagnosis.causes.candidates import ENOUGH, Finding, value
 from jaxident.diagnosis.causes.unexplained import UNEXPLAINED
 from jaxident.diagnosis.common import Values
-from jaxident.diagnosis.extent.measure import Gap
 from jaxident.diagnosis.simulator import Simulator
 from jaxident.effects.catalogue import CATALOGUE, SITES
 
@@ -49,13 +49,24 @@ class Cause(NamedTuple):
 
 
 class Judgement(NamedTuple):
-    """Probabilities of no gap, of an unknown one, and of sets of effects; causes, most probable first; of each site."""
+    """Two statements: probabilities of sets of effects, () for none, which add up to one, whatever else takes part; and
+    `unexplained`, that something takes part which no named effect covers. causes, most probable first; probability of
+    each site."""
 
-    none: float
-    unknown: float
+    unexplained: float
     sets: list[tuple[tuple[str, ...], float]]
     causes: list[Cause]
     sites: dict[str, float]
+
+    @property
+    def none(self) -> float:
+        """Probability that no effect takes part."""
+        return sum(p for effects, p in self.sets if not effects)
+
+    @property
+    def gap(self) -> float:
+        """Probability that anything is beyond the nominal model."""
+        return 1.0 - self.none * (1.0 - self.unexplained)
 
 
 def judge(
@@ -78,18 +89,15 @@ def judge(
     weights = {effects: worth / temperature(finding) for effects, (worth, _) in values.items()}
     top = max(weights.values())
     total = sum(np.exp(weight - top) for weight in weights.values())
-    unknown = unknown_probability(finding, gap, simulator)
-    known = 1.0 - unknown
+    unexplained = unexplained_probability(finding, gap, simulator)
     sets: dict[tuple[str, ...], float] = {}
     for effects, weight in weights.items():
         key = tuple(sorted({*values[effects][1], *sure}))
-        sets[key] = sets.get(key, 0.0) + known * float(np.exp(weight - top) / total)
-    none = sets.pop((), 0.0)
+        sets[key] = sets.get(key, 0.0) + float(np.exp(weight - top) / total)
     ordered = sorted(((key, p) for key, p in sets.items() if p > 1e-4), key=lambda pair: -pair[1])
-    spare = 1.0 - none - unknown - sum(p for _, p in ordered)
+    spare = 1.0 - sum(p for _, p in ordered)
     ordered = [(key, p + spare if k == 0 else p) for k, (key, p) in enumerate(ordered)]
-    none = none if ordered else 1.0 - unknown
-    return Judgement(none, unknown, ordered, _causes(finding, ordered), _sites(finding, ordered, unknown))
+    return Judgement(unexplained, ordered, _causes(finding, ordered), _sites(finding, ordered, unexplained))
 
 
 def temperature(finding: Finding) -> float:
@@ -97,7 +105,7 @@ def temperature(finding: Finding) -> float:
     return TEMPERATURE + INEXACT * max(finding.candidates[finding.selected].gain, 0.0)
 
 
-def unknown_probability(finding: Finding, gap: Gap, simulator: Simulator | None = None) -> float:
+def unexplained_probability(finding: Finding, gap: Gap, simulator: Simulator | None = None) -> float:
     """How sure it is that something outside the selected set takes part: terms of the corrector explain more, runs that
     served nothing else are predicted worse than noise allows, or more is called slip than wheels slip and more than a
     small part of the error on those runs. What a simulator leaves unexplained as well, or calls slip, is no difference
@@ -116,7 +124,7 @@ def rest_of(finding: Finding, simulator: Simulator | None = None) -> float:
     if simulator is None or simulator.finding is None:
         return finding.rest
     other = simulator.finding
-    windows = float(np.sum(finding.data.use)) / max(float(np.sum(other.data.use)), 1.0)
+    windows = len(finding.data.windows.run) / max(len(other.data.windows.run), 1)
     return max(finding.rest - windows * other.rest, 0.0)
 
 
@@ -178,12 +186,12 @@ def alike(finding: Finding, name: str) -> tuple[str, ...]:
     return tuple(sorted({other for effects in rivals for other in set(effects) - rest} - {name}))
 
 
-def _sites(finding: Finding, sets, unknown: float) -> dict[str, float]:
+def _sites(finding: Finding, sets, unexplained: float) -> dict[str, float]:
     """Probability that each site takes part; an unknown cause lies where the corrector's terms do, and without any
     somewhere between motors and ground, as what cannot be told from slip does."""
     rest, found = finding.rest, {}
     for site in SITES:
         known = sum(p for effects, p in sets if any(CATALOGUE[name].site == site for name in effects))
         lies = sum(gain for term, gain in finding.terms if term.site == site) / rest if rest else NOWHERE[site]
-        found[site] = float(min(known + unknown * lies, 1.0))
+        found[site] = float(min(known + unexplained * lies, 1.0))
     return found

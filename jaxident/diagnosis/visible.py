@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from jaxident.diagnosis.causes.candidates import ENOUGH
-from jaxident.diagnosis.motion.coordinates import COORDINATES, SHAPES, from_catalogue, to_catalogue
 from jaxident.effects.catalogue import CATALOGUE
+from jaxident.effects.coordinates import COORDINATES, SHAPES, from_catalogue, to_catalogue
 
 ALL_OR_NOTHING = ("input_saturation",)
 """Effects whose gain does not grow with their size: a level above every command does nothing at all."""

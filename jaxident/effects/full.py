@@ -14,7 +14,7 @@ from jaxident.effects.input_chain import at_rest, push
 from jaxident.effects.intervals import Grid, make_grid
 from jaxident.effects.substep import ADDED, FRICTION, Motion, after_half, move, solve_half
 from jaxident.robot.drive import Force, Physical, advance, force, hold, wheel_speeds
-from jaxident.robot.noise import Noise, correlated, draw_noise, observe, slip
+from jaxident.robot.noise import Noise, correlated, draw_noise, draw_white, observe, slip
 
 SUBSTEPS = 4
 """Per camera interval; enough for 1e-6 m in a run of 200 samples where the effects are smooth."""
@@ -81,7 +81,7 @@ def run_undisturbed(
 def disturb(pose: Pose, vector: Array, t: Array, *, noise: Noise | None, key: Array, parts: frozenset[str]) -> Pose:
     """The camera's random errors on poses (samples,): its noise, then those among the effects."""
     if noise is not None:
-        pose = observe(pose, noise, draw_noise(key, len(t)), jnp.diff(t))
+        pose = observe(pose, noise, draw_noise(key, len(t)), jnp.diff(t), draw_white(noise, key, len(t)))
     return _disturbed(_settings(vector, parts), pose, jnp.diff(t), _keys(key)[1:])
 
 

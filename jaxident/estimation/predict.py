@@ -1,30 +1,26 @@
-"""Free-run prediction from many rows of a log, each start state estimated from the rows before it alone."""
+"""Free-run prediction from many rows of a log, each start state filtered from the rows before it alone."""
 
-from functools import partial
 from typing import Any, NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
-from jaxident.array_types import Pose, Wheels
 from jaxident.effects.checks import check_effects
 from jaxident.errors import InputError
-from jaxident.estimation.free_run import Fit, Window, fit_with_noise, free_run, over_windows
-from jaxident.estimation.predict_filtered import filter_rows, run_ahead_filtered
+from jaxident.estimation import session
+from jaxident.estimation.predict_difference import run_difference_ahead
+from jaxident.estimation.run_ahead import Ahead, run_ahead
+from jaxident.estimation.stretches import Starts, every
 from jaxident.log import Log
 from jaxident.numerics import require_float64
 from jaxident.robot.difference import Difference
 from jaxident.robot.model import Model, require_physical
 from jaxident.robot.simulate import check_period
 
-LEAD = 30
-"""Rows before the burn-in whose commands tell effects with a memory (a delay, a lag, play) where they stand."""
-
 
 class Prediction(NamedTuple):
     """One entry per predicted row (rows,): the run, the row of it that the prediction starts from, the steps since,
-    the time [s], the pose [m], [rad] and its standard deviation (`predict` says from what)."""
+    the time [s], the pose [m], [rad] and its standard deviation (`predict` says from what); run_up: whether the start
+    comes from a run-up of earlier commands, because the filter did not converge there."""
 
     run: Any
     start: Any
@@ -36,18 +32,29 @@ class Prediction(NamedTuple):
     sd_x: Any
     sd_y: Any
     sd_theta: Any
+    run_up: Any = False
 
 
-def predict(model: Model, log: Log, horizon: int, *, burn_in: int = 20, stride: int | None = None) -> Prediction:
+def predict(
+    model: Model,
+    log: Log,
+    horizon: int,
+    *,
+    burn_in: int = 20,
+    stride: int | None = None,
+    session_time: float | None = None,
+) -> Prediction:
     """Free runs over `horizon` rows from rows burn_in, burn_in + stride, ... of each run (stride: the horizon).
 
-    A physical model with a noise law starts from the filtered state (`predict_filtered`: over the last `burn_in` rows,
-    with slip over at least FORGOTTEN), and the deviations tell of start state, slip and the covariance of the
-    parameters. For other models the state at the first of the last `burn_in` rows is fitted to the poses up to the
-    start by Gauss-Newton, each channel weighted by the fit's own noise; the deviations tell of that fit alone. So it is
-    for models with effects, whose free runs begin LEAD rows earlier; runs follow each other in session time, and what
-    is random among effects does not act. Runs too short to start in are left out; a free run ends with its run.
-    InputError where no run is long enough, and for effects that `check_effects` refuses. Needs double precision.
+    A physical model, with effects or without, starts from the filtered state (`run_ahead`): over the last `burn_in`
+    rows, with slip over at least FORGOTTEN. The deviations tell of start state, slip and the covariance of the
+    parameters. A start where the filter does not converge comes from a run-up of earlier commands from rest, laid on
+    the last pose. A model of free numerators is fitted to the poses of the burn-in; its deviations tell of that fit
+    alone. session_time [s]: that of the first row, for effects that drift; by default where the
+    log stood among those that the model was made from, or right after them (`session.session_time`). Runs follow each
+    other in it. Runs too short to start in are left out; a free
+    run ends with its run. InputError where no run is long enough, and for effects that `check_effects` refuses. Needs
+    double precision.
     """
     require_float64("predict")
     if model.effects:
@@ -57,94 +64,56 @@ def predict(model: Model, log: Log, horizon: int, *, burn_in: int = 20, stride: 
     for name, value, least in (("horizon", horizon, 1), ("burn-in", burn_in, 1), ("stride", stride, 1)):
         if value < least:
             raise InputError(f"{name} {value}: at least {least} row is needed")
+    starts = every(log, burn_in, stride)
     if isinstance(model.dynamics, Difference):
         check_period(model, log)
-    filtered = None if model.effects else filter_rows(model, burn_in)
-    before = filtered or burn_in + (LEAD if model.effects else 0)
-    numbers, starts, windows = _cut(log, horizon, burn_in, stride, before, burn_in if model.effects else before)
-    if filtered is None:
-        early = jax.tree.map(lambda column: column[:, : before + 1] if column.ndim == 2 else column, windows)
-        run = _run_ahead(model, windows, fit_with_noise(model, early))
-        run = jax.tree.map(lambda column: column[:, before + 1 :], run)
+        ahead = run_difference_ahead(model, log, starts, horizon, burn_in)
     else:
-        run = _filter_all(model, windows, before)
-    pose, deviation = jax.tree.map(np.asarray, run)
-    return _flatten(log, numbers, starts, windows, pose, deviation, before)
+        begin = session.session_time(model, log) if session_time is None else session_time
+        ahead = run_ahead(model, log, starts, horizon, burn_in=burn_in, session_time=begin)
+    return _flatten(log, starts, ahead)
 
 
-def _cut(
-    log: Log, horizon: int, burn_in: int, stride: int, before: int, seen: int
-) -> tuple[np.ndarray, np.ndarray, Window]:
-    """Run index, start row and window of every start, `before` rows before it, `seen` of them with their poses.
-
-    Rows past the end of a run repeat with time going on; those before its beginning hold no pose and no command.
-    """
-    numbers, starts, windows, passed = [], [], [], 0.0
-    for number, run in enumerate(log.runs()):
-        period = float(np.median(np.diff(run.t))) if len(run.t) > 1 else 1.0
-        for start in range(burn_in, len(run.t) - 1, stride):
-            rows = np.arange(start - before, start + horizon + 1)
-            inside = np.clip(rows, 0, len(run.t) - 1)
-            t = np.asarray(run.t)[inside] + period * (rows - inside)
-            pose = Pose(*(np.asarray(column)[inside] for column in run.pose))
-            known = np.isfinite(pose.x) & (rows <= start) & (rows >= max(start - seen, 0))
-            command = Wheels(*(np.where(rows < 0, 0.0, np.asarray(u)[inside]) for u in run.command))
-            pose = Pose(*(np.where(known, column, 0.0) for column in pose))
-            windows.append(Window(t, command, pose, known, passed + t[0] - float(run.t[0])))
-            numbers.append(number)
-            starts.append(start)
-        passed += float(run.t[-1] - run.t[0])
-    if not windows:
-        raise InputError(f"no run is longer than the burn-in of {burn_in} rows: nothing to predict")
-    return np.array(numbers), np.array(starts), jax.tree.map(lambda *columns: np.stack(columns), *windows)
-
-
-@partial(jax.jit, static_argnames="before")
-def _filter_all(model: Model, windows: Window, before: int) -> tuple[Pose, Pose]:
-    return over_windows(lambda window: run_ahead_filtered(model, window, before), windows)
-
-
-@jax.jit
-def _run_ahead(model: Model, windows: Window, fits: Fit) -> tuple[Pose, Pose]:
-    """Poses of whole windows (windows, rows) and their standard deviations, from the fitted start states."""
-
-    def one(window, fit):
-        poses = free_run(model, window)
-        slopes = jax.jacfwd(poses)(fit.start)
-        spread = (jnp.sqrt(jnp.einsum("ki,ij,kj->k", slope, fit.covariance, slope)) for slope in slopes)
-        return poses(fit.start), Pose(*spread)
-
-    return over_windows(lambda pair: one(*pair), (windows, fits))
-
-
-def _flatten(log, numbers, starts, windows, pose, deviation, before) -> Prediction:
+def _flatten(log: Log, starts: Starts, ahead: Ahead) -> Prediction:
     """One row per predicted row that the log still has."""
-    lengths = np.array([len(run.t) for run in log.runs()])
-    names = np.array([run.run[0] for run in log.runs()])
-    horizon = pose.x.shape[1]
-    step = np.broadcast_to(np.arange(1, horizon + 1), pose.x.shape)
-    kept = starts[:, None] + step < lengths[numbers][:, None]
-    times = np.asarray(windows.t)[:, before + 1 :][kept]
-    values = (column[kept] for column in (*pose, *deviation))
-    run, start = (np.broadcast_to(column[:, None], pose.x.shape)[kept] for column in (names[numbers], starts))
-    return Prediction(run, start, step[kept], times, *values)
+    runs = log.runs()
+    lengths = np.array([len(run.t) for run in runs])
+    count, horizon = ahead.pose.shape[:2]
+    step = np.broadcast_to(np.arange(1, horizon + 1), (count, horizon))
+    kept = starts.row[:, None] + step < lengths[starts.run][:, None]
+    run, start, run_up = (
+        np.broadcast_to(column[:, None], kept.shape)[kept]
+        for column in (np.array([run.run[0] for run in runs])[starts.run], starts.row, ahead.run_up)
+    )
+    t = np.concatenate([np.asarray(runs[k].t)[row + 1 :][:horizon] for k, row in zip(*starts, strict=True)])
+    deviation = np.sqrt(np.maximum(np.diagonal(ahead.covariance, axis1=2, axis2=3), 0.0))
+    columns = (column[kept] for column in (*np.moveaxis(ahead.pose, 2, 0), *np.moveaxis(deviation, 2, 0)))
+    return Prediction(run, start, step[kept], t, *columns, run_up)
 
 
 def prediction_error(prediction: Prediction, log: Log) -> dict[str, Any]:
-    """How far the free runs end from the measured poses, over the longest runs whose last row has a pose."""
+    """How far the free runs end from the measured poses, over the longest runs whose last row has a pose: median and
+    root mean square, beside what the predictions' own deviations say (`expected`, without camera error). `starts`:
+    free runs that reach the horizon; `run_up`: those that began from a run-up; `failed`: those that are not finite,
+    which count in no mean."""
     last = np.flatnonzero(prediction.step == prediction.step.max())
     runs = {int(run.run[0]): run for run in log.runs()}
     ends = [(runs[int(prediction.run[k])], int(prediction.start[k]), int(prediction.step[k]), k) for k in last]
     seconds = [float(run.t[start + step] - run.t[start]) for run, start, step, _ in ends]
-    seen = [
-        (prediction.x[k] - run.x[row], prediction.y[k] - run.y[row], prediction.theta[k] - run.theta[row])
-        for run, start, step, k in ends
-        if np.isfinite(run.x[row := start + step])
-    ]
-    dx, dy, turn = np.array(seen).reshape(-1, 3).T
+    measured = np.array([[run.pose[c][start + step] for c in range(3)] for run, start, step, _ in ends])
+    modelled = np.stack([prediction.x, prediction.y, prediction.theta], axis=1)[last]
+    deviation = np.stack([prediction.sd_x, prediction.sd_y, prediction.sd_theta], axis=1)[last]
+    finite = np.isfinite(modelled).all(axis=1) & np.isfinite(deviation).all(axis=1)
+    seen = np.isfinite(measured).all(axis=1) & finite
+    dx, dy, turn = (measured - modelled)[seen].T
     position, heading = np.hypot(dx, dy), np.abs((turn + np.pi) % (2.0 * np.pi) - np.pi)
-    summary: dict[str, Any] = {"starts": len(last), "compared": len(seen), "seconds": float(np.median(seconds))}
-    for name, error in (("position", position), ("heading", heading)):
-        summary[f"{name}_median"] = float(np.median(error)) if seen else None
-        summary[f"{name}_rms"] = float(np.sqrt(np.mean(error**2))) if seen else None
+    own = np.sqrt(np.mean(deviation[seen] ** 2, axis=0)) if seen.any() else np.full(3, np.nan)
+    summary: dict[str, Any] = {
+        "starts": len(last), "compared": int(seen.sum()), "failed": int(np.sum(~finite)),
+        "run_up": int(np.sum(prediction.run_up[last])), "seconds": float(np.median(seconds)),
+    }  # fmt: skip
+    for name, error, told in (("position", position, np.hypot(own[0], own[1])), ("heading", heading, own[2])):
+        summary[f"{name}_median"] = float(np.median(error)) if seen.any() else None
+        summary[f"{name}_rms"] = float(np.sqrt(np.mean(error**2))) if seen.any() else None
+        summary[f"{name}_expected"] = float(told) if seen.any() else None
     return summary

@@ -1,15 +1,17 @@
-"""diagnosis.json, "schema": "jaxident.diagnosis/1": what a diagnosis found, for programs."""
+"""diagnosis.json, "schema": "jaxident.diagnosis/2": what a diagnosis found, for programs."""
 
 from typing import Any
 
 import numpy as np
 
-from jaxident.diagnosis.diagnose import Diagnosis, Gap
-from jaxident.diagnosis.extent.where import OF_COMMANDS, Region
+from jaxident.diagnosis.account.account import Account, Row
+from jaxident.diagnosis.account.measure import Gap
+from jaxident.diagnosis.account.where import OF_COMMANDS, Region
+from jaxident.diagnosis.diagnose import Diagnosis
 from jaxident.diagnosis.replay import Replay
 from jaxident.effects.catalogue import CATALOGUE
 
-SCHEMA = "jaxident.diagnosis/1"
+SCHEMA = "jaxident.diagnosis/2"
 
 
 def diagnosis_to_dict(found: Diagnosis) -> dict[str, Any]:
@@ -19,10 +21,11 @@ def diagnosis_to_dict(found: Diagnosis) -> dict[str, Any]:
         "schema": SCHEMA,
         "verdict": found.verdict,
         "probability": {
-            "none": judgement.none,
-            "unknown": judgement.unknown,
+            "gap": judgement.gap,
+            "unexplained": judgement.unexplained,
             "sets": [{"effects": list(effects), "p": p} for effects, p in judgement.sets],
         },
+        "account": account_to_dict(found.account),
         "gap": _gap(found.gap),
         "where": {
             "site": judgement.sites,
@@ -32,12 +35,34 @@ def diagnosis_to_dict(found: Diagnosis) -> dict[str, Any]:
         },
         "causes": _causes(found),
         "selected": list(found.selected),
+        "discovered": None,
         "surplus": list(found.surplus),
         "parameters": [p._asdict() for p in found.parameters],
         "not_testable": found.not_testable,
         "replays": _replays(found.replay),
-        "unexplained": [{"site": term.site, "term": term.name, "gain": gain} for term, gain in found.finding.terms],
+        "terms": [{"site": term.site, "term": term.name, "gain": gain} for term, gain in found.finding.terms],
         "next": found.next,
+    }
+
+
+def account_to_dict(account: Account) -> dict[str, Any]:
+    """Who causes how much, in mm and mrad."""
+    return {
+        "horizon": account.horizon,
+        "windows": account.windows,
+        "failed": account.failed,
+        "rows": [_row(row) for row in account.rows],
+    }
+
+
+def _row(row: Row) -> dict[str, Any]:
+    return {
+        "part": row.part,
+        "rms_position": 1e3 * row.rms_position,
+        "rms_heading": 1e3 * row.rms_heading,
+        "share": row.share,
+        "share_interval": list(row.interval),
+        "channels": row.channels,
     }
 
 
@@ -51,9 +76,15 @@ def _gap(gap: Gap) -> dict[str, Any]:
         "before": gap.before,
         "refitted": gap.refitted,
         "after": gap.after,
+        "discovered": gap.after,
         "floor": {"value": gap.floor, "interval": list(gap.floor_interval)},
         "shrink": gap.shrink.value,
         "shrink_interval": _listed(gap.shrink.interval),
+        "rms": {
+            name: {"position": 1e3 * position, "heading": 1e3 * heading}
+            for name, (position, heading) in gap.rms.items()
+        },
+        "run_up": gap.run_up,
         "placebo": placebo,
     }
 
@@ -87,6 +118,7 @@ def _causes(found: Diagnosis) -> list[dict[str, Any]]:
     """One object per cause; parameters from the corrected model, or from the effect's own refit."""
     known = {effect.name: effect for effect in found.corrected_model.effects}
     rows = []
+    shares = {row.part: row.share for row in found.account.rows}
     for cause in found.judgement.causes:
         effect = known.get(cause.effect)
         shrink = found.shrinks.get(cause.effect)
@@ -97,6 +129,7 @@ def _causes(found: Diagnosis) -> list[dict[str, Any]]:
                 "probability": cause.probability,
                 "parameters": None if effect is None else effect.parameters,
                 "standard_deviation": None if effect is None else effect.standard_deviation,
+                "share": shares.get(cause.effect),
                 "shrink": None if shrink is None else shrink.value,
                 "indistinguishable_from": list(cause.indistinguishable_from),
                 "extension": CATALOGUE[cause.effect].extension,

@@ -18,7 +18,9 @@ from jaxident.robot.noise import Noise
 
 SHAPES: dict[str, Shape] = {"alpha": (2,), "delta": (2, 2), "epsilon": (2, 2), "dead_zone": (2,)}
 PHYSICAL_SHAPES: dict[str, Shape] = {"rate": (2,), "gain": (2, 2), "coupling": (2,)}
-_NOISE_NEEDED, _NOISE_FREE = ("position", "heading"), ("correlation_time", "slip_along", "slip_heading")
+_NOISE_NEEDED = ("position", "heading")
+_NOISE_NONE = ("correlation_time", "slip_time", "white_position", "white_heading")
+_NOISE_FREE = tuple(name for name in Noise._fields if name not in _NOISE_NEEDED)
 
 Written = TypeVar("Written")
 
@@ -48,16 +50,17 @@ def write_physical(physical: Physical) -> dict[str, Any]:
 
 
 def read_noise(value: Any, where: str) -> Noise:
-    """The noise law; a correlation time of zero is none, a slip that is not given is zero."""
+    """The noise law; a correlation time of zero is none, a slip or a white part that is not given is zero."""
     found = take_keys(value, where, _NOISE_NEEDED, _NOISE_FREE)
     given = {key: 0.0 if key in _NOISE_FREE and entry is None else entry for key, entry in found.items()}
     noise = Noise(**{key: take_number(entry, f"{where}.{key}", least=0.0) for key, entry in given.items()})
-    return noise._replace(correlation_time=noise.correlation_time or None)
+    return noise._replace(**{key: getattr(noise, key) or None for key in _NOISE_NONE})
 
 
 def write_noise(noise: Noise) -> dict[str, Any]:
-    """The noise law; white noise has the correlation time null."""
-    return {key: or_none(to_lists, value) for key, value in noise._asdict().items()}
+    """The noise law; white noise has the correlation time null. Keys that came later stand there where they matter."""
+    kept = {key: value for key, value in noise._asdict().items() if value is not None or key == "correlation_time"}
+    return {key: or_none(to_lists, value) for key, value in kept.items()}
 
 
 def read_effects(value: Any, where: str, known: Collection[str]) -> tuple[Effect, ...]:
@@ -172,11 +175,32 @@ def write_covariance(matrix: Any, order: tuple[str, ...]) -> dict[str, Any]:
 
 
 def read_provenance(value: Any, where: str) -> Provenance:
-    """Version and method, the logs and the seed or None."""
+    """Version and method, the logs, the seed or None, and the session: its duration and the runs that are known."""
     found = take_keys(value, where, (), Provenance._fields)
     version, method = (take_text(found[key] or "", f"{where}.{key}") for key in ("version", "method"))
     logs = take_list(found["logs"] or [], f"{where}.logs")
     seed = found["seed"]
     if seed is not None and type(seed) is not int:
         raise InputError(f"{where}.seed: should be an integer or null")
-    return Provenance(version, method, tuple(take_text(log, f"{where}.logs[{k}]") for k, log in enumerate(logs)), seed)
+    names = tuple(take_text(log, f"{where}.logs[{k}]") for k, log in enumerate(logs))
+    duration = take_number(found["duration"] or 0.0, f"{where}.duration", least=0.0)
+    runs = [
+        _read_run(run, f"{where}.runs[{k}]") for k, run in enumerate(take_list(found["runs"] or [], f"{where}.runs"))
+    ]
+    return Provenance(version, method, names, seed, duration, tuple(runs))
+
+
+def _read_run(value: Any, where: str) -> tuple[str, float]:
+    found = take_keys(value, where, ("mark", "session_time"), ())
+    return take_text(found["mark"], f"{where}.mark"), take_number(
+        found["session_time"], f"{where}.session_time", least=0.0
+    )
+
+
+def write_provenance(origin: Provenance) -> dict[str, Any]:
+    """Where the model comes from; the session where it is known."""
+    content = {**origin._asdict(), "logs": list(origin.logs)}
+    content["runs"] = [{"mark": own, "session_time": time} for own, time in origin.runs]
+    if not origin.runs:
+        del content["runs"], content["duration"]
+    return content

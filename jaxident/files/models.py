@@ -34,6 +34,7 @@ from jaxident.files.model_sections import (
     write_effect,
     write_noise,
     write_physical,
+    write_provenance,
 )
 from jaxident.files.schema import take_array, take_keys, take_number
 from jaxident.files.source import Source
@@ -89,7 +90,7 @@ def model_to_dict(model: Model) -> dict[str, Any]:
         "effects": [write_effect(effect) for effect in model.effects],
         "standard_deviation": write_deviations(model.standard_deviation),
         "covariance": or_none(write_covariance, model.covariance, model.parameter_order),
-        "provenance": {**model.provenance._asdict(), "logs": list(model.provenance.logs)},
+        "provenance": write_provenance(model.provenance),
     }
     model_from_dict(content, {effect.name for effect in model.effects}, "this model")
     return content

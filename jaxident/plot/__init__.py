@@ -20,6 +20,7 @@ _HOMES = {
     "correlation": "fits",
     "effect_signature": "effects",
     "confusion": "diagnosis",
+    "waterfall": "account",
     "gap_levels": "diagnosis",
     "gap_map": "diagnosis",
     "ranking": "diagnosis",

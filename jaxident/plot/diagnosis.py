@@ -41,7 +41,7 @@ def gap_levels(
         spread = None if intervals is None else np.abs(np.asarray(intervals[name], float).T - middle)
         look: dict[str, Any] = {"linestyle": "none", "marker": marker, "markersize": 5.0, "color": colour}
         ax.errorbar(middle, shift, xerr=spread, elinewidth=1.4, label=name, **look)
-    _rows(ax, rows)
+    name_rows(ax, rows)
     _spread_out(ax)
     ax.set_xlabel("mean squared error at the horizon [camera variances]")
     style.legend_above(ax)
@@ -116,7 +116,7 @@ def ranking(
         ax.annotate(text, (end, place), (4, 0), textcoords="offset points", va="center", fontsize=style.TEXT - 1)
     low, high = ax.get_xlim()
     ax.set_xlim(low, high**1.15 if logarithmic else 1.15 * high)
-    _rows(ax, list(gains))
+    name_rows(ax, list(gains))
     ax.set_xlabel("gain: fall of $-\\log p$ against the nominal model")
     style.legend_above(ax)
     return ax
@@ -143,7 +143,7 @@ def shrinks(
         ax.errorbar(middle, here, xerr=spread, elinewidth=1.4, label=group, **look)
     low, high = ax.get_xlim()
     ax.set_xlim(min(low, -8.0), max(high, 108.0))
-    _rows(ax, list(values))
+    name_rows(ax, list(values))
     ax.set_xlabel("shrink of the gap [%] with 90 % interval")
     style.legend_above(ax)
     return ax
@@ -178,7 +178,7 @@ def _colour_bar(ax: Axes, shown: Any, label: str) -> None:
     bar.outline.set_linewidth(style.THIN)  # type: ignore[operator]
 
 
-def _rows(ax: Axes, names: Sequence[str]) -> None:
+def name_rows(ax: Axes, names: Sequence[str]) -> None:
     """Rows from the top down under their names."""
     ax.set_yticks(range(len(names)), list(names))
     ax.set_ylim(len(names) - 0.5, -0.5)

@@ -7,11 +7,11 @@ import numpy as np
 from jaxident import plot
 from jaxident.diagnosis.causes.candidates import ENOUGH, PENALTY, Candidate, value
 from jaxident.diagnosis.diagnose import Diagnosis
-from jaxident.diagnosis.motion.coordinates import ASIDE, COORDINATES, PLACES
 from jaxident.diagnosis.replay import DRAWS, FAINT, Replay
 from jaxident.diagnosis.verdict import believable_excess, believable_slip, rest_of, slip_of_drive
 from jaxident.diagnosis.visible import smallest_sizes
 from jaxident.effects.catalogue import CATALOGUE
+from jaxident.effects.coordinates import ASIDE, COORDINATES, PLACES
 from jaxident.report.page import Figure, Section, Table
 from jaxident.report.words import EFFECTS, chance, number, parameters, percent, plain, together
 
@@ -23,8 +23,9 @@ def causes(found: Diagnosis) -> Section:
     """Which effects: probabilities, parameters, look-alikes, the ranking, and what none of them explains."""
     judgement = found.judgement
     text = (
-        f"Probability that nothing is missing: {chance(judgement.none)}; that something takes part which the catalogue "
-        f"has no name for: {chance(judgement.unknown)}."
+        f"Probability that anything is missing in the nominal model: {chance(judgement.gap)}. That something takes part "
+        f"which no named effect covers: {chance(judgement.unexplained)}. The probability of an effect below says that it "
+        "takes part, whatever else does."
     )
     table = _cause_table(found)
     first = table if table.rows else "No effect of the catalogue is likely to take part."
@@ -41,13 +42,14 @@ RANKING = (
 
 def _cause_table(found: Diagnosis) -> Table:
     in_force = {effect.name: effect for effect in found.corrected_model.effects}
-    rows = []
+    rows, shares = [], {row.part: row.share for row in found.account.rows}
     for cause in found.judgement.causes:
         effect = in_force.get(cause.effect)
         size = "–" if effect is None else parameters(cause.effect, effect.parameters, effect.standard_deviation)
-        rows.append((plain(cause.effect), EFFECTS[cause.effect], chance(cause.probability), size))
-    return Table(("effect", "what it is", "probability", "size ± standard deviation"), rows,
-                 "Most probable first; sizes are those of the corrected model.")  # fmt: skip
+        share = percent(shares.get(cause.effect))
+        rows.append((plain(cause.effect), EFFECTS[cause.effect], chance(cause.probability), share, size))
+    return Table(("effect", "what it is", "takes part", "share of the error", "size ± standard deviation"), rows,
+                 "Most probable first; shares and sizes are those of the corrected model.")  # fmt: skip
 
 
 def _look_alikes(found: Diagnosis) -> list[str]:

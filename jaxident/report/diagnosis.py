@@ -5,13 +5,26 @@ from importlib.metadata import version
 import numpy as np
 
 from jaxident import plot
+from jaxident.diagnosis.account.judging import CHANNELS
+from jaxident.diagnosis.account.shrink import interval
 from jaxident.diagnosis.diagnose import DIFFERENT, Diagnosis
-from jaxident.diagnosis.extent.gap import CHANNELS
-from jaxident.diagnosis.extent.shrink import interval
 from jaxident.report import causes, words
+from jaxident.report.account import account_section
 from jaxident.report.lead import deviations, lead
 from jaxident.report.page import Figure, Page, Section, Table
-from jaxident.report.words import NOMINAL, SITES, SPACE, VARIABLES, chance, measured, number, percent, together
+from jaxident.report.words import (
+    NOMINAL,
+    SITES,
+    SPACE,
+    VARIABLES,
+    angle,
+    chance,
+    length,
+    measured,
+    number,
+    percent,
+    together,
+)
 
 LISTED = 12
 """Regions that the table shows."""
@@ -20,6 +33,7 @@ LISTED = 12
 def diagnosis_page(found: Diagnosis, name: str) -> Page:
     """The page of one diagnosis; `name` says of what, such as the logs' folder."""
     sections = [
+        account_section(found.account),
         _gap(found),
         _where(found),
         causes.causes(found),
@@ -43,17 +57,24 @@ def _gap(found: Diagnosis) -> Section:
             intervals[label] = [interval(part) for part in channels]
     if not levels:
         return Section("How large the gap is", ["No stretch of the logs is left to judge by."])
-    floor = [gap.floor, *np.asarray(gap.replay.channels).mean(axis=0).tolist()]
+    floor = [gap.floor, *np.mean(gap.noise.total / gap.unit, axis=0).tolist()]
     rows = ("all channels", *CHANNELS)
     figure, ax = plot.figure(size=(6.3, 2.9))
     plot.gap_levels(levels, floor, rows=rows, intervals=intervals, floor_interval=gap.floor_interval, ax=ax)
     picture = Figure(plot.image(figure), "Error of each model by channel, against the floor", GAP_CAPTION)
+    sizes = dict(zip((*_models(found), "floor"), (gap.rms[key] for key in RMS), strict=True))
     cells = [
-        (name, *(float(f"{value:.3g}") for value in values)) for name, values in (levels | {"floor": floor}).items()
+        (name, length(sizes[name][0]), angle(sizes[name][1]), *(float(f"{value:.3g}") for value in values))
+        for name, values in (levels | {"floor": floor}).items()
     ]
     with_effects = f" The corrected model has {together(selected)}." if (selected := found.finding.selected) else ""
-    table = Table(("model", *rows), cells, f"Mean squared errors in camera variances.{with_effects}")
+    table = Table(("model", "position", "heading", *rows), cells,
+                  f"Root mean square errors, then mean squares in camera variances.{with_effects}")  # fmt: skip
     return Section("How large the gap is", [GAP.format(horizon=gap.horizon), picture, table])
+
+
+RMS = ("before", "refitted", "after", "floor")
+"""Keys of `Gap.rms` in the order of the table."""
 
 
 def _models(found: Diagnosis) -> tuple[str, str, str]:

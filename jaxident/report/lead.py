@@ -1,8 +1,9 @@
 """The first lines of a diagnosis's page: the verdict, in a sentence or two."""
 
+from jaxident.diagnosis.account.account import REST
 from jaxident.diagnosis.diagnose import DIFFERENT, Diagnosis, Parameter
 from jaxident.report import causes, words
-from jaxident.report.words import NOMINAL, SPACE, number, percent, plain, together
+from jaxident.report.words import NOMINAL, error, number, percent, plain, together
 
 COUNTS = {2: "two", 3: "three", 4: "four"}
 CLEAREST = 3
@@ -10,28 +11,67 @@ CLEAREST = 3
 
 
 def lead(found: Diagnosis) -> str:
-    """The verdict in a sentence or two."""
-    gap = found.gap
-    low, high = gap.floor_interval
+    """The verdict in a few sentences."""
+    rms = found.gap.rms
     if found.verdict == "no_gap":
         return (
-            f"No gap: the model predicts these logs {gap.horizon:.3g} s ahead as well as noise allows, with an error "
-            f"of {number(gap.before)} camera variances where noise alone makes {number(low)} to {number(high)}."
+            f"No gap: {_ahead(found)} the model is off by {error(rms['refitted'])} (root mean square), where noise alone "
+            f"makes {error(rms['floor'])}."
         )
     if found.verdict == "parameters":
         return (
-            f"The model has the right form but not the right parameters: {_moved(found)}. Refitting them takes the "
-            f"error from {number(gap.before)} to {number(gap.refitted)} camera variances; noise alone makes "
-            f"{number(low)} to {number(high)}."
+            f"The model has the right form but not the right parameters: {_moved(found)}. Refitting them takes the error "
+            f"{_ahead(found)} from {error(rms['before'])} to {error(rms['refitted'])} (root mean square); noise alone "
+            f"makes {error(rms['floor'])}."
         )
-    if found.verdict == "effects":
-        many = f"{COUNTS.get(len(found.selected), 'several')} unmodelled effects"
-        count = "one unmodelled effect" if len(found.selected) == 1 else many
-        rest = f"{_resized(found)} {_shrinks(found)}{_doubt(found)}"
-        return f"The gap comes from {count}: {causes.in_words(found)}.{rest}"
+    if found.verdict in ("effects", "partly"):
+        return f"{_named(found)}{_left(found)}{_resized(found)}{_doubt(found)}"
     if found.verdict == "unknown":
-        return f"There is a gap that no effect of the catalogue explains{_place(found)}. {_best_try(found)}"
+        return f"There is a gap that no effect of the catalogue explains{_place(found)}. {_size(found)}"
     return f"These logs do not suffice for a verdict. {found.next}"
+
+
+def _ahead(found: Diagnosis) -> str:
+    return f"{found.gap.horizon:.3g} s ahead"
+
+
+def _size(found: Diagnosis) -> str:
+    """How large the refitted model's error is beside noise."""
+    rms = found.gap.rms
+    return (
+        f"The nominal model is off by {error(rms['refitted'])} {_ahead(found)} (root mean square), where noise alone "
+        f"makes {error(rms['floor'])}."
+    )
+
+
+def _named(found: Diagnosis) -> str:
+    """What was named, with the part of the error that it makes."""
+    many = f"{COUNTS.get(len(found.selected), 'several')} unmodelled effects"
+    count = "one unmodelled effect" if len(found.selected) == 1 else many
+    begin = "The gap comes from" if found.verdict == "effects" else "A part of the gap comes from"
+    shares = {row.part: row.share for row in found.account.rows}
+    told = [f"{percent(shares[name])} is due to {plain(name)}" for name in found.selected if name in shares]
+    due = f" Of the mean squared error {_listed(told)}." if told else ""
+    return f"{begin} {count}: {causes.in_words(found)}. {_size(found)}{due}"
+
+
+def _listed(parts: list[str]) -> str:
+    """Parts of a sentence in a row."""
+    return f"{', '.join(parts[:-1])} and {parts[-1]}" if len(parts) > 1 else "".join(parts)
+
+
+def _left(found: Diagnosis) -> str:
+    """What the corrected model leaves, and whether something without a name is in it."""
+    after = (
+        f" With {'it' if len(found.selected) == 1 else 'them'} in the model {error(found.gap.rms['after'])} are left."
+    )
+    if not found.finding.selected and found.verdict == "effects":
+        after = " It acts by chance, so that no model can tell when."
+    if found.verdict == "effects":
+        return after
+    rest = next((row for row in found.account.rows if row.part == REST), None)
+    size = "" if rest is None or rest.share <= 0.0 else f", {percent(rest.share)} of the error"
+    return f"{after} Something else takes part that no named effect covers{size}{_place(found)}."
 
 
 def _moved(found: Diagnosis) -> str:
@@ -66,19 +106,6 @@ def deviations(parameter: Parameter) -> float:
     return abs(parameter.refitted - parameter.nominal) / max(parameter.standard_deviation, 1e-12)
 
 
-def _shrinks(found: Diagnosis) -> str:
-    shrink = found.gap.shrink
-    if "lost_commands" in found.selected and not found.finding.selected:
-        return "No model can tell which commands will be lost, so that no shrink is told; errors count only the others."
-    if not found.finding.selected:
-        return "It shows in the camera's poses and leaves the path alone, so that no shrink is told."
-    if shrink.value is None or shrink.interval is None:
-        return "On the runs kept for judging, the gap does not stand out from noise, so that no shrink can be told."
-    it = "it" if len(found.selected) == 1 else "them"
-    low, high = map(percent, shrink.interval)
-    return f"With {it} in the model the gap shrinks by {percent(shrink.value)} (90{SPACE}% interval {low} to {high})."
-
-
 def _doubt(found: Diagnosis) -> str:
     """Which selected effects could be others."""
     doubtful = [c for c in found.judgement.causes if c.indistinguishable_from and c.effect in found.selected]
@@ -96,12 +123,3 @@ def _place(found: Diagnosis) -> str:
     looks = f"it looks like {words.LOOKS[site]}" if likely > 0.0 else ""
     told = ", and ".join(part for part in (seen, looks) if part)
     return f"; {told}" if told else ""
-
-
-def _best_try(found: Diagnosis) -> str:
-    shrink, best = found.gap.shrink, found.finding.selected
-    if not best:
-        return "No set of known effects makes it smaller."
-    if shrink.value is None:
-        return f"Of the best known set, {together(best)}, no shrink can be told on the runs kept for judging."
-    return f"The best known set, {together(best)}, shrinks it by {percent(shrink.value)} and leaves the rest."

@@ -125,6 +125,42 @@ def measured(value: float, deviation: float | None, unit: str = "") -> str:
     return f"{value:.{digits}f}{SPACE}±{SPACE}{deviation:.{digits}f}{behind}".replace("-", "\N{MINUS SIGN}")
 
 
+PARTS = {
+    "camera": "camera noise",
+    "start": "start not known better",
+    "slip": "random slip",
+    "discovered": "discovered",
+    "rest": "not explained",
+}
+"""Parts of an error that no effect causes."""
+
+
+def part(name: str) -> str:
+    """A part of an error in words."""
+    return PARTS.get(name, plain(name))
+
+
+def length(metres: float) -> str:
+    """A length in millimetres with two or three digits."""
+    return f"{_short(1e3 * metres)}{SPACE}mm"
+
+
+def angle(radians: float) -> str:
+    """An angle in milliradians with two or three digits."""
+    return f"{_short(1e3 * radians)}{SPACE}mrad"
+
+
+def error(pair: tuple[float, float]) -> str:
+    """An error in position [m] and heading [rad]."""
+    return f"{length(pair[0])} and {angle(pair[1])}"
+
+
+def _short(value: float) -> str:
+    return f"{value:{'.0f' if abs(value) >= 99.95 else '.2g' if abs(value) < 9.95 else '.3g'}}".replace(
+        "-", "\N{MINUS SIGN}"
+    )
+
+
 def parameters(name: str, values: Mapping[str, float], deviations: Mapping[str, float] | None = None) -> str:
     """The parameters of an effect with units: "right 0.052 ± 0.003 unit, left 0.048 ± 0.004 unit"."""
     known = {parameter.name: parameter for parameter in CATALOGUE[name].parameters}

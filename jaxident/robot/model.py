@@ -22,12 +22,15 @@ DIFFERENCE_ORDER = (
 
 
 class Provenance(NamedTuple):
-    """Where a model comes from."""
+    """Where a model comes from. duration [s]: of all its logs, after which the session time goes on; runs: the mark by
+    which each run is known again (`estimation.session`), and the session time [s] of its first row."""
 
     version: str = ""
     method: str = ""
     logs: tuple[str, ...] = ()
     seed: int | None = None
+    duration: float = 0.0
+    runs: tuple[tuple[str, float], ...] = ()
 
 
 class Spread(NamedTuple):

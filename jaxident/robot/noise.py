@@ -18,7 +18,10 @@ class Noise(NamedTuple):
 
     position [m], heading [rad]: standard deviation of the camera's error. correlation_time [s]: that of the camera
     error, a first-order autoregression exp(-t / tau); None for white error. slip_along [m/s^1.5], slip_heading
-    [rad/s^1.5]: root spectral density of a random acceleration, drawn for each step and held over it.
+    [rad/s^1.5]: root spectral density of a random acceleration, drawn for each step and held over it. slip_time [s]:
+    correlation time of that acceleration, a first-order autoregression of the same density at low frequency; None for
+    one that is white. white_position [m], white_heading [rad]: the part of the camera's error that has no memory where
+    the rest has one; None for none.
     """
 
     position: Any = 0.0
@@ -26,6 +29,13 @@ class Noise(NamedTuple):
     correlation_time: Any = None
     slip_along: Any = 0.0
     slip_heading: Any = 0.0
+    slip_time: Any = None
+    white_position: Any = None
+    white_heading: Any = None
+
+
+WHITE = 2
+"""What a run's key is folded with for draws of its white camera error beside one with a memory."""
 
 
 class UnitNoise(NamedTuple):
@@ -49,22 +59,35 @@ def draw_noise(key: Array, samples: int) -> UnitNoise:
 
 
 def slip(noise: Noise, unit: UnitNoise, step: Array) -> Force:
-    """Random acceleration per step: root density over the root of the step [s], so that its sum does not depend
-    on how time is cut."""
-    scale = 1.0 / jnp.sqrt(step)
-    return Force(noise.slip_along * scale * unit.along, noise.slip_heading * scale * unit.heading)
+    """Random acceleration per step [s], scalar or (samples,): root density over the root of the step, so that its sum
+    does not depend on how time is cut; with a memory, an autoregression of that density at low frequency."""
+    if noise.slip_time is None:
+        scale = 1.0 / jnp.sqrt(step)
+        return Force(noise.slip_along * scale * unit.along, noise.slip_heading * scale * unit.heading)
+    scale, between = 1.0 / jnp.sqrt(2.0 * noise.slip_time), step if jnp.ndim(step) == 0 else step[:-1]
+    along, heading = (correlated(draw, between, noise.slip_time) for draw in (unit.along, unit.heading))
+    return Force(noise.slip_along * scale * along, noise.slip_heading * scale * heading)
 
 
-def observe(pose: Pose, noise: Noise, unit: UnitNoise, step: Array) -> Pose:
-    """What the camera reports of poses (samples,); step [s] scalar, or (samples - 1,) between the rows."""
+def observe(pose: Pose, noise: Noise, unit: UnitNoise, step: Array, white: UnitNoise | None = None) -> Pose:
+    """What the camera reports of poses (samples,); step [s] scalar, or (samples - 1,) between the rows. white: draws of
+    the part without memory where the law has one beside a part with (`draw_white`)."""
     error = Pose(unit.x, unit.y, unit.theta)
+    sizes = Pose(noise.position, noise.position, noise.heading)
     if noise.correlation_time is not None:
         error = Pose(*(correlated(draw, step, noise.correlation_time) for draw in error))
-    return Pose(
-        pose.x + noise.position * error.x,
-        pose.y + noise.position * error.y,
-        pose.theta + noise.heading * error.theta,
-    )
+    if white is None:
+        return Pose(*(p + s * e for p, s, e in zip(pose, sizes, error, strict=True)))
+    own = Pose(noise.white_position, noise.white_position, noise.white_heading)
+    parts = zip(pose, sizes, own, error, (white.x, white.y, white.theta), strict=True)
+    return Pose(*(p + jnp.sqrt(s**2 - w**2) * e + w * d for p, s, w, e, d in parts))
+
+
+def draw_white(noise: Noise, key: Array, samples: int) -> UnitNoise | None:
+    """Draws of the part of the camera's error that has no memory where another part has one; None without."""
+    if noise.correlation_time is None or noise.white_position is None:
+        return None
+    return draw_noise(jax.random.fold_in(key, WHITE), samples)
 
 
 def correlated(unit: Array, step: Array, time: Array) -> Array:

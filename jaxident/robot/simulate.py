@@ -13,7 +13,7 @@ from jaxident.robot.dead_zone import effective_command
 from jaxident.robot.difference import Difference, predict_increment
 from jaxident.robot.drive import Force, Hold, Physical, advance, force, hold
 from jaxident.robot.model import Model, require_physical
-from jaxident.robot.noise import UnitNoise, draw_noise, observe, slip
+from jaxident.robot.noise import UnitNoise, draw_noise, draw_white, observe, slip
 from jaxident.robot.path_length import follow
 
 
@@ -43,7 +43,9 @@ def _poses(model: Model, t: Array, command: Wheels, start: State, key: Array | N
     else:
         step = model.sample_period
         pose = run_difference(model.dynamics, model.dead_zone, command, start, model.sample_period)
-    return pose if unit is None or model.noise is None else observe(pose, model.noise, unit, step)
+    if key is None or unit is None or model.noise is None:
+        return pose
+    return observe(pose, model.noise, unit, step, draw_white(model.noise, key, len(t)))
 
 
 def run_physical(model: Model, command: Wheels, step: Array, start: State, unit: UnitNoise | None = None) -> State:

@@ -11,7 +11,7 @@ from jaxident.diagnosis.causes.candidates import Candidate
 from jaxident.diagnosis.causes.corrector import Term
 from jaxident.diagnosis.causes.search import Solution
 from jaxident.diagnosis.common import explain_together, lacks, shared_worth, shows
-from jaxident.diagnosis.motion.coordinates import PLACES, free_places, neutral_vector
+from jaxident.effects.coordinates import PLACES, free_places, neutral_vector
 
 TERM = Term("drive", "v^3 in the acceleration along")
 PRICE = 9.0

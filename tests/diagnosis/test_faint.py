@@ -12,7 +12,13 @@ from jaxident.diagnosis.causes.scores import STEP as STEP_OF
 from jaxident.diagnosis.causes.search import Data, best_starts, refit
 from jaxident.diagnosis.causes.steps import likely_steps
 from jaxident.diagnosis.frames import find_more_outliers, find_outliers, has_outliers
-from jaxident.diagnosis.motion.coordinates import (
+from jaxident.diagnosis.motion.linear import explained, follow, gram
+from jaxident.diagnosis.motion.responses import respond
+from jaxident.diagnosis.motion.windows import cut
+from jaxident.diagnosis.noise.law import Law, white_whitener
+from jaxident.diagnosis.replay import Answers, answers, replay, visible
+from jaxident.effects.catalogue import CATALOGUE
+from jaxident.effects.coordinates import (
     COORDINATES,
     PLACES,
     by_effect,
@@ -21,12 +27,6 @@ from jaxident.diagnosis.motion.coordinates import (
     nominal_vector,
     to_catalogue,
 )
-from jaxident.diagnosis.motion.linear import explained, follow, gram
-from jaxident.diagnosis.motion.responses import respond
-from jaxident.diagnosis.motion.windows import cut
-from jaxident.diagnosis.noise.law import Law, white_whitener
-from jaxident.diagnosis.replay import Answers, answers, replay, visible
-from jaxident.effects.catalogue import CATALOGUE
 from jaxident.log import join, make_log
 from jaxident.robot.drive import Physical
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from jaxident.diagnosis.causes.corrector import pursue
-from jaxident.diagnosis.motion.coordinates import PLACES, neutral_vector, nominal_vector
 from jaxident.diagnosis.motion.linear import explained, follow, gram, linearise
 from jaxident.diagnosis.motion.responses import answer_to_start
 from jaxident.diagnosis.motion.windows import cut
+from jaxident.effects.coordinates import PLACES, neutral_vector, nominal_vector
 from jaxident.log import make_log
 from jaxident.robot.drive import Physical
 

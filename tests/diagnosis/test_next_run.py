@@ -8,7 +8,6 @@ import pytest
 
 from jaxident.array_types import AT_REST
 from jaxident.diagnosis.causes.search import Data, refit
-from jaxident.diagnosis.motion.coordinates import neutral_vector, nominal_vector
 from jaxident.diagnosis.motion.linear import follow
 from jaxident.diagnosis.motion.windows import cut, uncut
 from jaxident.diagnosis.noise.law import Law, whitener_of
@@ -17,6 +16,7 @@ from jaxident.diagnosis.planning.next_run import plan, separations
 from jaxident.diagnosis.planning.trial_inputs import KINDS, make, vary
 from jaxident.diagnosis.prepare import first_starts
 from jaxident.effects.apply import with_effects
+from jaxident.effects.coordinates import neutral_vector, nominal_vector
 from jaxident.effects.simulate import simulate
 from jaxident.errors import InputError
 from jaxident.files.models import load_model

@@ -5,7 +5,11 @@ import numpy as np
 import pytest
 
 from jaxident.array_types import State
-from jaxident.diagnosis.motion.coordinates import (
+from jaxident.diagnosis.motion.paths import push_of, residuals, track
+from jaxident.diagnosis.motion.windows import cut
+from jaxident.diagnosis.translate import abreast_of_marker
+from jaxident.effects.catalogue import CATALOGUE
+from jaxident.effects.coordinates import (
     COORDINATES,
     ON_SPEEDS,
     PLACES,
@@ -16,11 +20,8 @@ from jaxident.diagnosis.motion.coordinates import (
     neutral_vector,
     nominal_vector,
 )
-from jaxident.diagnosis.motion.inputs import PUSHING
-from jaxident.diagnosis.motion.paths import push_of, report, residuals, track
-from jaxident.diagnosis.motion.windows import cut
-from jaxident.diagnosis.translate import abreast_of_marker
-from jaxident.effects.catalogue import CATALOGUE
+from jaxident.effects.fast_input import PUSHING
+from jaxident.effects.fast_motion import report
 from jaxident.effects.simulate import simulate
 from jaxident.log import make_log
 from jaxident.robot.drive import Physical
@@ -50,7 +51,7 @@ def log():
 @pytest.fixture(scope="module")
 def follow(log):
     windows = cut(log, ROWS)
-    compiled = jax.jit(lambda vector: report(by_effect(vector), track(vector, np.zeros((5, 1)), windows)))
+    compiled = jax.jit(lambda vector: report(by_effect(vector), *track(vector, np.zeros((5, 1)), windows).pose))
     return lambda vector: np.stack([np.asarray(part)[:, 0] for part in compiled(vector)])
 
 

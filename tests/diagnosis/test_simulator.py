@@ -8,10 +8,10 @@ import pytest
 from jaxident.diagnosis.causes import direct
 from jaxident.diagnosis.diagnose import compare_parameters
 from jaxident.diagnosis.frames import Frames
-from jaxident.diagnosis.motion.coordinates import PLACES, free_places, neutral_vector
 from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.simulator import Simulator, _direct, as_simulator, check_units, is_noisy, rarer, shared
 from jaxident.diagnosis.translate import abreast_of_marker
+from jaxident.effects.coordinates import PLACES, free_places, neutral_vector
 from jaxident.errors import InputError
 from jaxident.log import make_log
 from jaxident.robot.drive import Physical

@@ -7,9 +7,9 @@ import pytest
 
 from jaxident.diagnosis.causes.search import Solution
 from jaxident.diagnosis.diagnose import compare_parameters
-from jaxident.diagnosis.motion.coordinates import PLACES, free_places, neutral_vector
 from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.translate import effect_of, to_model
+from jaxident.effects.coordinates import PLACES, free_places, neutral_vector
 
 PLACE = {key: PLACES["traction_limit", key] for key in ("inverse_square", "dry", "spin")}
 

@@ -8,8 +8,8 @@ import pytest
 from jaxident.diagnosis.causes import sets, which
 from jaxident.diagnosis.causes.candidates import ELSEWHERE, FORM, Candidate, form_price
 from jaxident.diagnosis.causes.corrector import Term
-from jaxident.diagnosis.motion.coordinates import SIZE
 from jaxident.diagnosis.noise.law import Law
+from jaxident.effects.coordinates import SIZE
 
 FIRST, SECOND, OTHER = "turn_loss", "supply_sag", "transport_delay"
 

@@ -8,7 +8,10 @@ from support.diagnoses import VERDICTS, made_up
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.files.diagnosis import diagnosis_to_dict
 
-KEYS = {"schema", "verdict", "probability", "gap", "where", "causes", "selected", "parameters", "not_testable", "next"}
+KEYS = {"schema", "verdict", "probability", "account", "gap", "where", "causes", "selected", "discovered", "parameters",
+        "not_testable", "next"}  # fmt: skip
+GAP = {"horizon", "before", "refitted", "after", "discovered", "floor", "shrink", "shrink_interval", "rms"}
+FIXED = ["camera", "start", "slip", "discovered", "rest"]
 
 
 @pytest.mark.parametrize("verdict", VERDICTS)
@@ -17,9 +20,27 @@ def test_every_verdict_is_strict_json_with_the_keys_of_the_schema(verdict):
     assert json.loads(json.dumps(content, allow_nan=False)) == content
     assert content.keys() >= KEYS
     assert content["verdict"] == verdict
-    assert content["gap"].keys() >= {"horizon", "before", "refitted", "after", "floor", "shrink", "shrink_interval"}
+    assert content["schema"] == "jaxident.diagnosis/2"
+    assert content["probability"].keys() == {"gap", "unexplained", "sets"}
+    assert sum(each["p"] for each in content["probability"]["sets"]) == pytest.approx(1.0)
+    assert content["gap"].keys() >= GAP
+    assert content["gap"]["rms"].keys() == {"before", "refitted", "after", "discovered", "floor"}
+    assert not set(content["selected"]) & set(content["not_testable"])
     for cause in content["causes"]:
         assert cause["site"] == CATALOGUE[cause["effect"]].site
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_the_account_adds_up(verdict):
+    found = made_up(verdict)
+    rows = diagnosis_to_dict(found)["account"]["rows"]
+    assert [row["part"] for row in rows] == [*FIXED[:3], *found.selected, *FIXED[3:]]
+    assert sum(row["share"] for row in rows) == pytest.approx(1.0, abs=1e-9)
+    for row in rows:
+        assert row.keys() == {"part", "rms_position", "rms_heading", "share", "share_interval", "channels"}
+        assert row["share_interval"][0] <= row["share"] <= row["share_interval"][1]
+    squares = sum(row["rms_position"] * abs(row["rms_position"]) for row in rows)
+    assert squares == pytest.approx(diagnosis_to_dict(found)["gap"]["rms"]["refitted"]["position"] ** 2)
 
 
 def test_regions_of_commands_are_in_the_users_unit():

@@ -8,19 +8,21 @@ from support.diagnoses import LARGEST, VERDICTS, made_up
 
 from jaxident.diagnosis.causes.candidates import Candidate
 from jaxident.diagnosis.diagnose import Parameter
-from jaxident.diagnosis.motion.coordinates import free_places
 from jaxident.diagnosis.visible import smallest_sizes
 from jaxident.effects.catalogue import CATALOGUE
+from jaxident.effects.coordinates import free_places
 from jaxident.report import Figure, Table, render
+from jaxident.report.account import account_lines
 from jaxident.report.causes import BESIDE
 from jaxident.report.diagnosis import diagnosis_page
 from jaxident.report.lead import lead
 from jaxident.report.words import EFFECTS, LOOKS, SITES, chance, measured, number, parameters, percent, together
 
 LEADS = {
-    "no_gap": "No gap: the model predicts these logs 1 s ahead as well as noise allows",
+    "no_gap": "No gap: 1 s ahead the model is off by",
     "parameters": "The model has the right form but not the right parameters: coupling_2 is 2.9, not 2;",
     "effects": "The gap comes from two unmodelled effects: transport delay (commands act late",
+    "partly": "A part of the gap comes from one unmodelled effect: quadratic drag (drag that grows with the square",
     "unknown": "There is a gap that no effect of the catalogue explains; 55 % of it shows in the direction of travel",
     "undecided": "These logs do not suffice for a verdict. Record a longer <run> & more.",
 }
@@ -50,11 +52,19 @@ def test_every_verdict_has_a_page(verdict):
     assert any(isinstance(block, Figure) for block in page.sections[0].blocks)
 
 
-def test_lead_tells_sizes_shrink_and_look_alikes():
+def test_lead_tells_sizes_shares_and_look_alikes():
     told = plain_spaces(lead(made_up("effects")))
     assert "delay 0.0521 ± 0.0034 s" in told
-    assert "the gap shrinks by 99 % (90 % interval 96 % to 101 %)" in told
+    assert "The nominal model is off by" in told
+    assert "is due to transport delay and" in told
+    assert "With them in the model" in told
     assert told.endswith("This input cannot tell transport delay from motor lag.")
+
+
+def test_lead_tells_a_rest_beside_a_name():
+    told = plain_spaces(lead(made_up("partly")))
+    assert "Something else takes part that no named effect covers" in told
+    assert f"it looks like {LOOKS['contact']}" in told
 
 
 def test_lead_tells_known_effects_of_another_size():
@@ -66,7 +76,7 @@ def test_lead_tells_known_effects_of_another_size():
         Parameter("input_saturation level", None, 0.5, 0.01),
     ]
     told = lead(made_up("effects")._replace(parameters=sizes))
-    assert "Effects that the model has already differ in size: transport delay delay is 0.214, not 0.07. With" in told
+    assert "Effects that the model has already differ in size: transport delay delay is 0.214, not 0.07." in told
     assert "already" not in lead(made_up("effects", given=True))
 
 
@@ -74,26 +84,28 @@ def test_lead_tells_known_effects_of_another_size():
 def test_lead_tells_what_an_unknown_gap_looks_like(site):
     found = made_up("unknown")
     found = found._replace(judgement=found.judgement._replace(sites={site: 0.9}))
-    assert f"and it looks like {LOOKS[site]}. The best" in lead(found)
+    assert f"and it looks like {LOOKS[site]}. The nominal" in lead(found)
 
 
-def test_lead_tells_the_best_set_where_its_shrink_is_unknown():
-    found = made_up("unknown")
-    gap = found.gap._replace(shrink=found.gap.shrink._replace(value=None))
-    assert f"Of the best known set, {together(found.finding.selected)}, no shrink" in lead(found._replace(gap=gap))
-    found = found._replace(finding=found.finding._replace(selected=()))
-    assert lead(found).endswith("No set of known effects makes it smaller.")
+@pytest.mark.parametrize("name", ["frozen_frames", "lost_commands"])
+def test_effects_of_chance_alone_leave_no_error_of_a_corrected_model(name):
+    found = made_up("no_gap")._replace(verdict="effects", selected=(name,))
+    assert f"{name.replace('_', ' ')} ({EFFECTS[name]})" in lead(found)
+    assert "It acts by chance, so that no model can tell when." in lead(found)
 
 
-def test_effects_of_the_camera_alone_tell_no_shrink():
-    found = made_up("no_gap")._replace(verdict="effects", selected=("frozen_frames",))
-    assert "frozen frames (the camera repeats old poses)" in lead(found)
-    assert lead(found).endswith("no shrink is told.")
-
-
-def test_lost_commands_tell_no_shrink():
-    found = made_up("no_gap")._replace(verdict="effects", selected=("lost_commands",))
-    assert "which commands will be lost" in lead(found)
+def test_the_account_is_the_first_picture_and_the_first_lines():
+    found = made_up("effects")
+    part = diagnosis_page(found, "runs").sections[0]
+    assert part.heading == "Who causes how much"
+    (table,) = tables(part)
+    assert [row[0] for row in table.rows] == ["camera noise", "start not known better", "random slip",
+                                              "transport delay", "quadratic drag", "not explained"]  # fmt: skip
+    lines = account_lines(found.account)
+    assert all(line.isascii() for line in lines)
+    assert len(lines) == 1 + len(table.rows)
+    assert lines[4].split()[:2] == ["transport", "delay"]
+    assert lines[4].count("#") > lines[5].count("#") > 0
 
 
 def test_replays_are_told_with_what_they_miss():
@@ -128,10 +140,10 @@ def test_models_that_were_not_given_are_not_shown():
 def test_nothing_seen_is_a_page_too():
     found = made_up("undecided", given=True)
     nothing = np.full((3, 4, 3), np.nan)
-    replay = found.gap.replay._replace(channels=nothing[0])
-    gap = found.gap._replace(errors=nothing, floor=np.nan, floor_interval=(np.nan, np.nan), replay=replay)
+    gap = found.gap._replace(errors=nothing, floor=np.nan, floor_interval=(np.nan, np.nan))
+    account = found.account._replace(rows=[], windows=0)
     finding = found.finding._replace(candidates={(): found.finding.candidates[()]})
-    page = diagnosis_page(found._replace(gap=gap, finding=finding, shrinks={}), "runs")
+    page = diagnosis_page(found._replace(gap=gap, account=account, finding=finding, shrinks={}), "runs")
     assert section(page, "How large the gap is").blocks == ["No stretch of the logs is left to judge by."]
     assert "No effect promised enough to be fitted." in section(page, "Which effect causes it").blocks
 

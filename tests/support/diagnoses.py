@@ -4,54 +4,68 @@ from typing import Any
 
 import numpy as np
 
+from jaxident.diagnosis.account.account import account_of
+from jaxident.diagnosis.account.floor import Floor
+from jaxident.diagnosis.account.shrink import Shrink
+from jaxident.diagnosis.account.where import Place, Region
 from jaxident.diagnosis.causes.candidates import Candidate, Finding
 from jaxident.diagnosis.causes.corrector import Term
 from jaxident.diagnosis.diagnose import Diagnosis, Gap, Parameter
-from jaxident.diagnosis.extent.floor import Floor
-from jaxident.diagnosis.extent.shrink import Shrink
-from jaxident.diagnosis.extent.where import Place, Region
 from jaxident.diagnosis.frames import Frames
-from jaxident.diagnosis.motion.coordinates import COORDINATES, NOMINAL
 from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.prepare import Prepared
 from jaxident.diagnosis.replay import Replay
 from jaxident.diagnosis.verdict import Cause, Judgement
 from jaxident.effects.catalogue import SITES
+from jaxident.effects.coordinates import COORDINATES, NOMINAL
 from jaxident.robot.drive import Physical
 from jaxident.robot.model import Effect, Model
 
-VERDICTS = ("no_gap", "parameters", "effects", "unknown", "undecided")
+VERDICTS = ("no_gap", "parameters", "effects", "partly", "unknown", "undecided")
 LARGEST = 2.0
+COUNT = 30
 _LAW = Law(1e-3, 5e-3)
+UNIT = np.array([1e-3, 1e-3, 5e-3]) ** 2
 REPLAY = Replay(("slope", "motor_lag"), np.array([[0.99, 0.01, 0.0], [0.02, 0.98, 0.0], [0.3, 0.0, 0.7]]))
 _NOTHING: Any = None
 """Stands for parts of a search that no page shows."""
 
 
 def made_up(verdict: str, *, given: bool = False) -> Diagnosis:
-    """A diagnosis of 30 windows with some verdict; `given`: of a nominal model that the user gave."""
-    effects, gap = verdict == "effects", verdict in ("effects", "unknown")
+    """A diagnosis of 30 starts with some verdict; `given`: of a nominal model that the user gave."""
+    gap = verdict in ("effects", "partly", "unknown")
     given = given or verdict == "parameters"
-    selected = ("transport_delay", "quadratic_drag") if effects else ("marker_offset",) if verdict == "unknown" else ()
-    after = {"effects": 1.2, "unknown": 25.0}.get(verdict, 1.1)
+    selected = {"effects": ("transport_delay", "quadratic_drag"), "partly": ("quadratic_drag",)}.get(verdict, ())
+    after = {"effects": 1.2, "partly": 25.0, "unknown": 40.0}.get(verdict, 1.1)
     levels = (60.0 if given else 40.0) if gap or given else 1.1, 40.0 if gap else 1.1, after
     shrinks = {name: Shrink(*_shrink(value, gap)) for name, value in SHRINKS.items()}
     shrink = Shrink(*_shrink(1.0 - (after - 1.0) / 39.0, gap))
-    errors = np.stack([level * np.random.default_rng(4).chisquare(3, (30, 3)) / 3.0 for level in levels])
+    errors = np.stack([level * np.random.default_rng(4).chisquare(3, (COUNT, 3)) / 3.0 for level in levels])
     errors = errors * (np.array([1.5, 0.3, 1.2]) if gap else 1.0)
-    replay = Floor(1.05, np.linspace(0.8, 1.3, 400), np.full((30, 3), 1.05))
+    parts = (np.full((COUNT, 3), part) * UNIT for part in (1.0, 0.05, 0.0))
+    floor = Floor(*parts, {}, np.linspace(0.8, 1.3, 400), np.linspace(0.8, 1.3, 400))
     placebo = ("camera_scale", shrinks["camera_scale"])
     model = Model(0.05, Physical(np.array([2.0, 3.0]), np.ones((2, 2)), np.zeros(2)), np.array([0.1, 0.1]))
     return Diagnosis(
         verdict, _judgement(verdict, selected),
-        Gap(1.0, *levels, 1.05, (0.8, 1.3), shrink, placebo, errors, replay), _place(gap),
-        selected if effects else (),
+        Gap(1.0, *levels, 1.05, (0.8, 1.3), shrink, placebo, errors, floor, UNIT, 0),
+        account_of(1.0, _errors(errors, selected), selected, floor, UNIT), _place(gap), selected,
         [Parameter(n, 2.0 if given else None, 2.0 + 0.1 * k, 0.06) for k, n in enumerate(NOMINAL)],
         {name: 1.7**k / 10.0 for k, name in enumerate(reversed(COORDINATES))},
         REPLAY, "Record a longer <run> & more.",
-        model, _with_effects(model, selected), shrinks, Prepared(_NOTHING, LARGEST, _NOTHING, _NOTHING, 1.0,
+        model, _with_effects(model, selected), shrinks, Prepared(_NOTHING, LARGEST, _NOTHING, _NOTHING, 30, 1.0,
         Frames(_NOTHING, _NOTHING), _NOTHING, _LAW), _finding(selected, gap, verdict),
     )  # fmt: skip
+
+
+def _errors(errors, selected) -> dict[frozenset[str], Any]:
+    """Errors of models with each set of the selected effects: the first takes two thirds away, the second the rest."""
+    before, after = np.sqrt(errors[1] * UNIT), np.sqrt(errors[2] * UNIT)
+    middle = np.sqrt((errors[1] + 2.0 * errors[2]) / 3.0 * UNIT)
+    if len(selected) < 2:
+        return {frozenset(): before, frozenset(selected): after}
+    one, other = (frozenset((name,)) for name in selected)
+    return {frozenset(): before, one: middle, other: before, frozenset(selected): after}
 
 
 SHRINKS = {
@@ -82,12 +96,14 @@ def _judgement(verdict: str, selected: tuple[str, ...]) -> Judgement:
                   Cause("quadratic_drag", "drive", 0.9, (), False),
                   Cause("motor_lag", "actuation", 0.01, (), False)]  # fmt: skip
         sets = [(tuple(sorted(selected)), 0.9), (("transport_delay",), 0.09), (("motor_lag", "quadratic_drag"), 0.01)]
-        return Judgement(0.0, 0.0, sets, causes, dict(zip(SITES, (1.0, 0.9, 0.0, 0.0, 0.0), strict=True)))
-    if verdict == "unknown":
-        causes = [Cause("marker_offset", "camera", 0.05, (), False)]
+        return Judgement(0.0, sets, causes, dict(zip(SITES, (1.0, 0.9, 0.0, 0.0, 0.0), strict=True)))
+    if verdict in ("partly", "unknown"):
+        name, site = (selected[0], "drive") if selected else ("marker_offset", "camera")
+        causes = [Cause(name, site, 0.95 if selected else 0.05, (), False)]
         sites = dict(zip(SITES, (0.1, 0.0, 0.8, 0.0, 0.15), strict=True))
-        return Judgement(0.0, 0.95, [(("marker_offset",), 0.05)], causes, sites)
-    return Judgement(0.97, 0.01, [(("camera_scale",), 0.02)], [], dict.fromkeys(SITES, 0.0))
+        sets = [((name,), causes[0].probability), ((), 1.0 - causes[0].probability)]
+        return Judgement(0.95, sorted(sets, key=lambda pair: -pair[1]), causes, sites)
+    return Judgement(0.01, [((), 0.97), (("camera_scale",), 0.03)], [], dict.fromkeys(SITES, 0.0))
 
 
 def _place(gap: bool) -> Place:
@@ -112,5 +128,7 @@ def _finding(selected: tuple[str, ...], gap: bool, verdict: str) -> Finding:
         gains["motor_lag", "quadratic_drag"] = 1.19 * size
         gains["transport_delay", "marker_offset"] = 0.82 * size
     candidates = {effects: Candidate(effects, _NOTHING, gain) for effects, gain in gains.items()}
-    terms: list[tuple[Any, float]] = [(Term("contact", "|v| w in the speed sideways"), 150.0)] * (verdict == "unknown")
+    terms: list[tuple[Any, float]] = [(Term("contact", "|v| w in the speed sideways"), 150.0)] * (
+        verdict in ("partly", "unknown")
+    )
     return Finding(_NOTHING, _LAW, _LAW, _NOTHING, candidates, selected, terms)

@@ -4,9 +4,9 @@ from collections.abc import Collection
 from typing import Any, NamedTuple
 
 from jaxident.diagnosis.causes.search import Data, Solution
-from jaxident.diagnosis.motion.coordinates import COORDINATES
 from jaxident.diagnosis.noise.law import Law
 from jaxident.effects.catalogue import CATALOGUE
+from jaxident.effects.coordinates import COORDINATES
 
 PENALTY = 4.0
 """Fall of -log p that each coordinate of an effect costs."""

@@ -17,7 +17,7 @@ def direct_evidence(prepared: Prepared, finding: Finding, price: float = ENOUGH)
     return {
         "frozen_frames": 10.0 * frozen if frozen >= 3 else 0.0,
         # normal noise lies OUTLYING deviations off once in 10^11 rows
-        "outliers": 10.0 * int(outlying.sum()) if has_outliers(outlying) else 0.0,
+        "outliers": 10.0 * int(outlying.sum()) if has_outliers(outlying, prepared.frames.poses) else 0.0,
         "lost_commands": prepared.lost[1] - (price - ENOUGH),
         "coloured_noise": _memory(finding, price) if finding.law.coloured is not None else 0.0,
     }
@@ -33,18 +33,20 @@ def _memory(finding: Finding, price: float) -> float:
     data, solution = finding.data, finding.candidates[finding.selected].solution
     responses = respond(np.exp(solution.vector[:2]), solution.linear.residual, data.windows)
     linear, law = solution.linear, finding.law
-    gain = steady_gain(linear.residual, linear.starts, data.windows, responses, data.use, law)
+    gain = steady_gain(linear.residual, linear.starts, data.windows, responses, law)
     return gain - (max(price, finding.further if finding.selected else ENOUGH) - ENOUGH)
 
 
 def direct_effects(prepared: Prepared, finding: Finding, selected) -> dict[str, dict[str, float]]:
     """Parameters of the selected effects among these."""
-    rows = max(len(prepared.log.t), 1)
-    found = {}
+    frames, poses = prepared.frames, max(prepared.frames.poses, 1)
+    found: dict[str, dict[str, float]] = {}
     if "frozen_frames" in selected:
-        found["frozen_frames"] = {"probability": float(prepared.frames.frozen.sum() / rows)}
+        found["frozen_frames"] = {"probability": float(frames.frozen.sum() / poses)}
     if "outliers" in selected:
-        found["outliers"] = {"probability": float(prepared.frames.outlying.sum() / rows)}
+        position, heading = frames.sizes
+        share = float(frames.outlying.sum() / poses)
+        found["outliers"] = {"probability": share, "position": position, "heading": heading}
     if "lost_commands" in selected:
         found["lost_commands"] = {"probability": prepared.lost[0]}
     if "coloured_noise" in selected and finding.law.coloured is not None:

@@ -50,8 +50,8 @@ def find_lost(data: Data, solution: Solution) -> Lost:
     windows, changes = data.windows, _changes(data, solution)
     best, delays = Lost(0.0, 0.0, windows.command), np.zeros(len(changes.window), int)
     for share in SHARES:
-        gain, found = _taken_at(share, changes, data.use)
-        late = sum(int(np.sum(found[k] > 0)) for k in np.flatnonzero(data.use))
+        gain, found = _taken_at(share, changes)
+        late = sum(int(np.sum(rows > 0)) for rows in found)
         if gain > best.gain and late >= FEWEST:
             best, delays = best._replace(share=float(share), gain=gain), np.concatenate(found)
     first = windows.first[changes.window] + changes.row
@@ -64,8 +64,8 @@ def find_lost(data: Data, solution: Solution) -> Lost:
 def gain_beyond(data: Data, solution: Solution, share: float) -> float:
     """What the likeliest share of lost commands gains beyond what another share does."""
     changes = _changes(data, solution)
-    likeliest = max(_taken_at(other, changes, data.use)[0] for other in SHARES)
-    return likeliest - _taken_at(share, changes, data.use)[0]
+    likeliest = max(_taken_at(other, changes)[0] for other in SHARES)
+    return likeliest - _taken_at(share, changes)[0]
 
 
 def _changes(data: Data, solution: Solution) -> _Changes:
@@ -77,11 +77,11 @@ def _changes(data: Data, solution: Solution) -> _Changes:
     return _Changes(window, row, late, before, columns, own, residual)
 
 
-def _taken_at(share: float, changes: _Changes, use: Array) -> tuple[float, list[np.ndarray]]:
-    """What the windows in use gain at a share of lost commands, and by how many rows each window's changes are late."""
+def _taken_at(share: float, changes: _Changes) -> tuple[float, list[np.ndarray]]:
+    """What all windows gain at a share of lost commands, and by how many rows each window's changes are late."""
     price = np.where(changes.late, -np.log(share) * np.arange(1, LATEST + 1), np.inf)
     found = [_delayed(changes.columns[c], changes.residual[k], price[c]) for k, c in enumerate(changes.own)]
-    gain = sum(found[k][0] + len(changes.own[k]) * np.log1p(-share) for k in np.flatnonzero(use))
+    gain = sum(own + len(c) * np.log1p(-share) for (own, _), c in zip(found, changes.own, strict=True))
     return float(gain), [rows for _, rows in found]
 
 

@@ -39,10 +39,10 @@ class Travel(NamedTuple):
 
 def rhythms(data: Data, solution: Solution, responses: Responses) -> list[Rhythm]:
     """The strongest rhythm of each wheel, right and left, in what a solution leaves."""
-    used, linear = data.use, solution.linear
-    columns = np.concatenate([responses.along, responses.heading, linear.residual[..., None]], axis=2)[used]
-    whitened, _ = without_starts(data.whitener[used], columns, linear.starts[used])
-    price = PERIOD_PRICE + PHASE_PRICE * len(np.unique(data.windows.run[used]))
+    linear = solution.linear
+    columns = np.concatenate([responses.along, responses.heading, linear.residual[..., None]], axis=2)
+    whitened, _ = without_starts(data.whitener, columns, linear.starts)
+    price = PERIOD_PRICE + PHASE_PRICE * len(np.unique(data.windows.run))
     found = []
     for wheel in _travels(data, solution):
         turns, phase = _strongest(data, wheel, np.exp(solution.vector[:2]), whitened)
@@ -72,11 +72,11 @@ def _travels(data: Data, solution: Solution) -> list[Travel]:
 
 def _strongest(data: Data, wheel: Travel, rates: Array, whitened: Array) -> tuple[float, np.ndarray]:
     """The period whose two phases, free in every run, explain most, and the best phase of each run (runs,); whitened
-    answers to accelerations along and in heading and residuals (windows used, numbers, 2 rows + 1)."""
-    run, count = data.windows.run[data.use], int(data.windows.run.max()) + 1
+    answers to accelerations along and in heading and residuals (windows, numbers, 2 rows + 1)."""
+    run, count = data.windows.run, int(data.windows.run.max()) + 1
     best, chosen = -1.0, (float(TURNS[0]), np.zeros(count))
     for turns in TURNS:
-        phases = [_forces(data, wheel, rates, turns, np.full(count, a))[data.use] for a in (0.0, 0.5 * np.pi)]
+        phases = [_forces(data, wheel, rates, turns, np.full(count, a)) for a in (0.0, 0.5 * np.pi)]
         pair = whitened[:, :, :-1] @ np.stack(phases, axis=2)
         curve, slope = np.zeros((count, 2, 2)), np.zeros((count, 2, 1))
         np.add.at(curve, run, pair.transpose(0, 2, 1) @ pair)

@@ -7,7 +7,8 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.search import Data, Solution
 from jaxident.diagnosis.causes.steps import likely_steps
-from jaxident.diagnosis.motion.coordinates import (
+from jaxident.diagnosis.motion.linear import explained, follow, gram, left_over, linearise, normal
+from jaxident.effects.coordinates import (
     COORDINATES,
     PLACES,
     SILENT,
@@ -15,7 +16,6 @@ from jaxident.diagnosis.motion.coordinates import (
     STEPPED,
     limits,
 )
-from jaxident.diagnosis.motion.linear import explained, follow, gram, left_over, linearise, normal
 
 STEPS = np.geomspace(0.02, 0.4, 96)
 """Steps of a quantised command where nothing suggests better ones, in largest commands."""
@@ -88,8 +88,8 @@ def score(data: Data, solution: Solution) -> dict[str, float]:
         for seed in _own_seeds(name, data, solution) if seed
     ]  # fmt: skip
     change = differences(data, solution, [seeded(solution.vector, *jump) for jump in jumps])
-    columns = np.concatenate([linear.slopes, change, linear.residual[..., None]], axis=2)[data.use]
-    products = gram(data.whitener[data.use], columns, linear.starts[data.use]).products.sum(axis=0)
+    columns = np.concatenate([linear.slopes, change, linear.residual[..., None]], axis=2)
+    products = gram(data.whitener, columns, linear.starts).products.sum(axis=0)
     base, column_of = list(range(len(free))), {place: len(free) + k for k, place in enumerate(more)}
     scores = {
         name: explained(products, base, [column_of[p] for p in places]) if places else 0.0
@@ -140,8 +140,8 @@ def _promises(data: Data, solution: Solution, name: str, points) -> tuple[list[n
     """Vectors with an effect at some seeds, the gain that each promises, and of how many times its size."""
     vectors = [seeded(solution.vector, name, seed) for seed in points]
     change = differences(data, solution, vectors)
-    columns = np.concatenate([solution.linear.slopes, change, solution.linear.residual[..., None]], axis=2)[data.use]
-    products = gram(data.whitener[data.use], columns, solution.linear.starts[data.use]).products.sum(axis=0)
+    columns = np.concatenate([solution.linear.slopes, change, solution.linear.residual[..., None]], axis=2)
+    products = gram(data.whitener, columns, solution.linear.starts).products.sum(axis=0)
     base = list(range(len(solution.places)))
     gains, parts, alone = [], [], left_over(products, base) - 0.5 * float(products[-1, -1])
     for k in range(len(points)):
@@ -162,8 +162,8 @@ def at_best(data: Data, solution: Solution, pair: tuple[str, str]) -> np.ndarray
         vectors[:, place] += span * np.linspace(-1.0, 1.0, len(vectors))
         lanes = np.broadcast_to(solution.starts, (len(vectors), *solution.starts.shape))
         found = np.moveaxis(follow(vectors, lanes, data.windows), 0, -1)
-        columns = np.concatenate([solution.linear.slopes, found], axis=2)[data.use]
-        products = gram(data.whitener[data.use], columns, solution.linear.starts[data.use]).products.sum(axis=0)
+        columns = np.concatenate([solution.linear.slopes, found], axis=2)
+        products = gram(data.whitener, columns, solution.linear.starts).products.sum(axis=0)
         orders = [[*range(base), base + k] for k in range(len(vectors))]
         left = [left_over(products[np.ix_(order, order)], order[:-1]) for order in orders]
         best = vectors[_middle_of_best(np.array(left))]

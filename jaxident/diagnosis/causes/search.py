@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.motion.coordinates import NOMINAL, PLACES, STEPPED, free_places, limits, neutral_vector
 from jaxident.diagnosis.motion.linear import Linear, follow, gram, linearise, normal
 from jaxident.diagnosis.motion.windows import Windows
+from jaxident.effects.coordinates import NOMINAL, PLACES, STEPPED, free_places, limits, neutral_vector
 
 MOST_STEPS = 20
 """Of one refit; what fits arrives in two to nine, what crawls is mostly an effect that is not there."""
@@ -20,16 +20,14 @@ PARTS = (1.0, 0.25, 0.0)
 
 
 class Data(NamedTuple):
-    """Windows, the whitener of their noise (windows, numbers, numbers), and which of them (boolean) a fit uses."""
+    """Windows and the whitener of their noise (windows, numbers, numbers)."""
 
     windows: Windows
     whitener: Any
-    use: Any
 
 
 class Solution(NamedTuple):
-    """A fit: vector (SIZE,), starts (5, windows), the linearisation there in `places`, half the squares over the
-    windows used, and the covariance of the free coordinates."""
+    """A fit: vector (SIZE,), starts (5, windows), the linearisation there in `places`, half the squares, and the covariance of the free coordinates."""
 
     vector: Any
     starts: Any
@@ -83,7 +81,7 @@ def _around(data: Data, vector: Array, starts: Array, places: list[int]) -> tupl
 
 def best_starts(data: Data, vector: Array, starts: Array, moved: Array) -> tuple[np.ndarray, float]:
     """Starts (5, windows) moved in every window by the part of what is asked for (5, windows) that fits best, and half
-    the squares of the windows used: one window that shows little of its start must not stop the others."""
+    the squares: one window that shows little of its start must not stop the others."""
     lanes = starts + np.array(PARTS)[:, None, None] * moved
     residual = follow(np.tile(vector, (len(lanes), 1)), lanes, data.windows)
     with np.errstate(over="ignore", invalid="ignore"):  # a start may run away
@@ -91,21 +89,21 @@ def best_starts(data: Data, vector: Array, starts: Array, moved: Array) -> tuple
     squares = np.where(np.isnan(squares), np.inf, squares)
     best = np.argmin(squares, axis=0)
     chosen = np.take_along_axis(lanes, best[None, None], axis=0)[0]
-    return chosen, float(np.sum(squares.min(axis=0)[data.use]))
+    return chosen, float(np.sum(squares.min(axis=0)))
 
 
 def _taken(data: Data, linear: Linear) -> float:
     """What start states would still take of the squares."""
-    residual = linear.residual[data.use]
-    whole = 0.5 * float(np.sum((data.whitener[data.use] @ residual[..., None]) ** 2))
-    rest = gram(data.whitener[data.use], residual[..., None], linear.starts[data.use])
+    residual = linear.residual
+    whole = 0.5 * float(np.sum((data.whitener @ residual[..., None]) ** 2))
+    rest = gram(data.whitener, residual[..., None], linear.starts)
     return whole - 0.5 * float(np.sum(rest.products))
 
 
 def _products(data: Data, linear: Linear) -> tuple[np.ndarray, np.ndarray]:
     """Summed products (n, n), the residual last, and what start states take in every window (windows, 5, n)."""
     found = gram(data.whitener, np.concatenate([linear.slopes, linear.residual[..., None]], axis=2), linear.starts)
-    return found.products[data.use].sum(axis=0), found.solve
+    return found.products.sum(axis=0), found.solve
 
 
 def _step(products: Array, now: Array, low: Array, high: Array, damping: float) -> tuple[np.ndarray, float]:

@@ -6,7 +6,7 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.causes.candidates import ENOUGH, PENALTY, Candidate, Finding, value
 from jaxident.diagnosis.causes.scores import INSTANT, STEP, at_best, beginnings, score
 from jaxident.diagnosis.causes.search import Data, Solution, refit
-from jaxident.diagnosis.motion.coordinates import (
+from jaxident.effects.coordinates import (
     COORDINATES,
     NOMINAL,
     SHAPES,

@@ -48,6 +48,5 @@ def past_zone(command: Array, solution: Solution) -> np.ndarray:
 def pulls(data: Data, residual: Array, responses: Responses) -> tuple[np.ndarray, np.ndarray]:
     """Fall of -log p by a unit more acceleration along and in heading in each row of each window (windows, rows)."""
     weighted = data.whitener.transpose(0, 2, 1) @ (data.whitener @ residual[..., None])
-    weighted = weighted * np.asarray(data.use)[:, None, None]
     along, heading = ((answer.transpose(0, 2, 1) @ weighted)[..., 0] for answer in responses[:2])
     return along, heading

@@ -21,7 +21,7 @@ UNEXPLAINED = 0.2
 
 class Choice(NamedTuple):
     """Terms with the fall of -log p that each brings; the residuals (windows, numbers) that they and the solution's
-    coordinates would leave; the restricted log-likelihood of the windows used, all of them free."""
+    coordinates would leave; the restricted log-likelihood, all of them free."""
 
     found: list[tuple[Term, float]]
     left: Any
@@ -41,7 +41,7 @@ def unexplained(
     choice = _choose(data, whitener_of(law, data.windows, responses), solution, terms, answers)
     if sized and law != Law(law.position, law.heading):
         left = _choose(data, white_whitener(law, data.windows), solution, terms, answers).left
-        again = size_noise(left, solution.linear.starts, data.windows, responses, data.use)
+        again = size_noise(left, solution.linear.starts, data.windows, responses)
         other = _choose(data, whitener_of(again, data.windows, responses), solution, terms, answers)
         if other.log_likelihood > choice.log_likelihood:
             return other.found, again
@@ -62,15 +62,15 @@ def _terms(data: Data, solution: Solution, responses: Responses) -> tuple[list[T
 
 def _choose(data: Data, whitener: Array, solution: Solution, terms: list[Term], answers: Array) -> Choice:
     """The terms that count under a whitener."""
-    linear, used, base = solution.linear, data.use, list(range(len(solution.places)))
+    linear, base = solution.linear, list(range(len(solution.places)))
     columns = np.concatenate([linear.slopes, answers, linear.residual[..., None]], axis=2)
-    products = gram(whitener[used], columns[used], linear.starts[used]).products.sum(axis=0)
+    products = gram(whitener, columns, linear.starts).products.sum(axis=0)
     candidates = [len(base) + k for k in range(len(terms))]
     found = pursue(products, base, candidates, np.array([term.price for term in terms]))
     free = [*base, *(place for place, _ in found)]
     own, cross, scale = normal(products, free)
     left = linear.residual - columns[..., free] @ (np.linalg.solve(own, cross) / scale)
-    volume = _log_volume(whitener[used], linear.starts[used])
+    volume = _log_volume(whitener, linear.starts)
     return Choice([(terms[place - len(base)], gain) for place, gain in found], left, volume - left_over(products, free))
 
 

@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxident.array_types import Array
 from jaxident.diagnosis.causes.candidates import ENOUGH, Candidate, Finding, value
 from jaxident.diagnosis.causes.search import Data, Solution, refit
 from jaxident.diagnosis.causes.sets import exchange, grow, ranked, refit_each, scores_of
@@ -37,21 +36,21 @@ class Search(NamedTuple):
 
 
 def search_effects(
-    windows: Windows, use: Array, nominal: Solution, law: Law, *, sized: bool = True, without: Collection[str] = ()
+    windows: Windows, nominal: Solution, law: Law, *, sized: bool = True, without: Collection[str] = ()
 ) -> Finding:
-    """From the nominal fit under a noise law to a selected set; `use` (boolean, windows) are those that name.
+    """From the nominal fit under a noise law to a selected set.
 
     The law is sized again at the best fit, for the nominal one takes what is missing for slip; not so if `sized` is
     False. Effects in `without` are left out, as if the catalogue had no word for them.
     """
-    data, responses = whiten(nominal, windows, use, law)
+    data, responses = whiten(nominal, windows, law)
     nominal = refit(data, nominal.vector, nominal.starts, ())
     scores = scores_of(data, nominal, without)
     found: dict[tuple[str, ...], Candidate] = {(): Candidate((), nominal, 0.0)}
     refit_each(found, data, nominal, _with_look_alikes(scores), ())
     best = max(found.values(), key=lambda c: c.evidence)
     again = resized(best.solution, data, responses, law, sized)
-    data, responses = whiten(best.solution, windows, use, again)
+    data, responses = whiten(best.solution, windows, again)
     found = _again(found, data)
     scores = scores_of(data, found[()].solution, without)
     refit_each(found, data, found[()].solution, [n for n in _with_look_alikes(scores) if (n,) not in found], ())
@@ -88,7 +87,7 @@ def _beside_rival(now: Search, without: Collection[str]) -> Search:
     law = resized(rival.solution, now.data, now.responses, now.law, sized=True)
     if not is_quieter(law, now.law, TAKEN):
         return now
-    data, responses = whiten(rival.solution, now.data.windows, now.data.use, law)
+    data, responses = whiten(rival.solution, now.data.windows, law)
     first = max((effects for effects in now.found if len(effects) == 1), key=lambda e: now.found[e].evidence)
     parts = [effects for effects in now.found if set(effects) <= set(rival.effects)]
     found = _again(now.found, data, [first, *parts])  # else sets alone might be left, and none to grow from
@@ -104,13 +103,13 @@ def resized(solution: Solution, data: Data, responses: Responses, law: Law, size
     """The law sized at a solution, slip believed for some gain, or as it was."""
     if not sized:
         return law
-    return size_noise(solution.linear.residual, solution.linear.starts, data.windows, responses, data.use, worth)
+    return size_noise(solution.linear.residual, solution.linear.starts, data.windows, responses, worth)
 
 
-def whiten(solution: Solution, windows: Windows, use: Array, law: Law) -> tuple[Data, Responses]:
+def whiten(solution: Solution, windows: Windows, law: Law) -> tuple[Data, Responses]:
     """The data under a law, slip linearised about a solution."""
     responses = respond(np.exp(solution.vector[:2]), solution.linear.residual, windows)
-    return Data(windows, whitener_of(law, windows, responses), use), responses
+    return Data(windows, whitener_of(law, windows, responses)), responses
 
 
 def _again(found: dict, data: Data, also: Collection[tuple[str, ...]] = ()) -> dict:

@@ -12,11 +12,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.motion.coordinates import NOMINAL, PLACES, limits, sizes
-from jaxident.diagnosis.motion.inputs import PUSHING
 from jaxident.diagnosis.motion.paths import push_of, residuals
 from jaxident.diagnosis.motion.responses import answer_to_start
 from jaxident.diagnosis.motion.windows import Windows
+from jaxident.effects.coordinates import NOMINAL, PLACES, limits, sizes
+from jaxident.effects.fast_input import PUSHING
 
 START_STATES = 5
 PART = 1e-5

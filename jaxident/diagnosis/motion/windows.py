@@ -1,4 +1,5 @@
-"""The logs as a diagnosis sees them: runs for what remembers, windows with a start of their own for what moves."""
+"""The logs as a diagnosis sees them: pieces of runs for what remembers, windows with a start of their own for what
+moves."""
 
 from typing import Any, NamedTuple
 
@@ -6,18 +7,19 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.estimation.runs import stack_runs
-from jaxident.log import Log
+from jaxident.log import Log, join, run_begins
 
 SMALLEST = 8
 """Poses that a window needs: fewer say nothing beyond its start state."""
 
 
 class Windows(NamedTuple):
-    """Runs cut into windows; time first, windows last.
+    """Pieces of runs cut into windows; time first, windows last.
 
-    t (rows of a run, runs) [s]: since the run's first row; session (runs,) [s]: session time of that row; command
-    (rows of a run, runs, 2). step (rows, windows) [s]: from each row to the next; pose (rows, windows, 3); seen (rows,
-    windows); run (windows,): of which run; first (windows,): its first row there.
+    t (rows of a piece, pieces) [s]: since the piece's first row; session (pieces,) [s]: session time of that row;
+    command (rows of a piece, pieces, 2). step (rows, windows) [s]: from each row to the next; pose (rows, windows, 3);
+    seen (rows, windows); run (windows,): of which piece; first (windows,): its first row there; row (windows,): in
+    the log.
     """
 
     t: Any
@@ -28,36 +30,53 @@ class Windows(NamedTuple):
     seen: Any
     run: Any
     first: Any
+    row: Any
 
 
-def cut(log: Log, rows: int, stride: int | None = None, session: Array | None = None) -> Windows:
-    """Windows of some rows, one every `stride` (default: rows, so that no pose counts twice), of every run.
+class Piece(NamedTuple):
+    """Rows `first` to `last`, the last not included, of a run of a log; commands count from row `begin` on, so that
+    what remembers them is run up."""
 
-    Rows past the end of a run are not seen; what the camera missed neither. session (runs,) overrides the sum of the
-    durations before.
+    run: int
+    begin: int
+    first: int
+    last: int
+
+
+def whole_runs(log: Log) -> list[Piece]:
+    """Every run as one piece."""
+    return [Piece(k, 0, 0, len(run.t)) for k, run in enumerate(log.runs())]
+
+
+def cut(log: Log, rows: int, stride: int | None = None, pieces: list[Piece] | None = None) -> Windows:
+    """Windows of some rows, one every `stride` (default: rows, so that no pose counts twice), of every piece (default:
+    whole runs).
+
+    Rows past the end of a piece are not seen; what the camera missed neither. Session time is the sum of the durations
+    of the runs before, and the time in this one.
     """
-    runs = stack_runs(log)
-    count, length = runs.seen.shape
-    step = np.broadcast_to(np.asarray(runs.step, float), (count, length)) if np.ndim(runs.step) == 0 else runs.step
+    pieces = whole_runs(log) if pieces is None else pieces
+    runs, stride = log.runs(), rows if stride is None else stride
+    passed = np.concatenate([[0.0], np.cumsum([run.t[-1] - run.t[0] for run in runs])])
+    own = [runs[piece.run].rows(piece.begin, piece.last) for piece in pieces]
+    stacked = stack_runs(join(own))
+    count, length = stacked.seen.shape
+    step = np.broadcast_to(np.asarray(stacked.step, float), (count, length))
     t = np.concatenate([np.zeros((count, 1)), np.cumsum(step[:, :-1], axis=1)], axis=1)
-    if session is None:
-        durations = [run.t[-1] - run.t[0] for run in log.runs()]
-        session = np.concatenate([[0.0], np.cumsum(durations)[:-1]])
-    stride = rows if stride is None else stride
-    firsts = np.arange(0, max(length - 1, 1), stride)
-    places = firsts[:, None] + np.arange(rows)
+    session = [passed[p.run] + run.t[0] - runs[p.run].t[0] for p, run in zip(pieces, own, strict=True)]
+    firsts = [np.arange(p.first - p.begin, max(p.last - p.begin - 1, 1), stride) for p in pieces]
+    run, first = np.repeat(np.arange(count), list(map(len, firsts))), np.concatenate(firsts)
+    places = first[:, None] + np.arange(rows)
     inside = np.minimum(places, length - 1)
-    pose = np.stack(runs.pose, axis=-1)
-    seen = runs.seen[:, inside] & (places < length)
-    kept = seen.sum(axis=2).ravel() >= SMALLEST
-
-    def windowed(values: np.ndarray) -> np.ndarray:
-        return np.moveaxis(values.reshape(-1, *values.shape[2:])[kept], 1, 0)
-
+    seen = stacked.seen[run[:, None], inside] & (places < length)
+    kept = seen.sum(axis=1) >= SMALLEST
+    run, first, seen, inside = run[kept], first[kept], seen[kept], inside[kept]
+    pose = np.stack(stacked.pose, axis=-1)
+    begins = np.array([run_begins(log)[piece.run] + piece.begin for piece in pieces])
     return Windows(
-        t=t.T, session=np.asarray(session, float), command=np.stack(runs.command, axis=-1).transpose(1, 0, 2),
-        step=windowed(step[:, inside]), pose=windowed(pose[:, inside]), seen=windowed(seen),
-        run=np.repeat(np.arange(count), len(firsts))[kept], first=np.tile(firsts, count)[kept],
+        t=t.T, session=np.asarray(session, float), command=np.stack(stacked.command, axis=-1).transpose(1, 0, 2),
+        step=step[run[:, None], inside].T, pose=pose[run[:, None], inside].transpose(1, 0, 2), seen=seen.T,
+        run=run, first=first, row=begins[run] + first,
     )  # fmt: skip
 
 
@@ -67,7 +86,7 @@ def uncut(commands: Array, period: float) -> Windows:
     t = np.tile(period * np.arange(samples)[:, None], (1, count))
     return Windows(
         t=t, session=np.zeros(count), command=np.asarray(commands).transpose(1, 0, 2), step=np.full(t.shape, period),
-        pose=np.zeros((*t.shape, 3)), seen=np.ones(t.shape, bool), run=np.arange(count), first=np.zeros(count, int),
+        pose=np.zeros((*t.shape, 3)), seen=np.ones(t.shape, bool), run=np.arange(count), first=np.zeros(count, int), row=np.zeros(count, int),
     )  # fmt: skip
 
 
@@ -75,5 +94,5 @@ def take(windows: Windows, chosen: Array) -> Windows:
     """Some of the windows; the runs stay whole."""
     return windows._replace(
         step=windows.step[:, chosen], pose=windows.pose[:, chosen], seen=windows.seen[:, chosen],
-        run=windows.run[chosen], first=windows.first[chosen],
+        run=windows.run[chosen], first=windows.first[chosen], row=windows.row[chosen],
     )  # fmt: skip

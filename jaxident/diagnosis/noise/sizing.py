@@ -58,13 +58,11 @@ class Sized(NamedTuple):
     log_likelihood: float
 
 
-def size_noise(
-    residual: Array, starts: Array, windows: Windows, responses: Responses, use: Array, worth: float = WORTH
-) -> Law:
+def size_noise(residual: Array, starts: Array, windows: Windows, responses: Responses, worth: float = WORTH) -> Law:
     """The likeliest law: white, with slip, with a camera memory, each only where it is worth its terms; from residuals
-    (windows, numbers) and derivatives by start states (windows, numbers, 5) of the windows in `use` (boolean). worth:
-    the gain for which slip is believed."""
-    given = sample(residual, starts, windows, responses, use)
+    (windows, numbers) and derivatives by start states (windows, numbers, 5). worth: the gain for which slip is
+    believed."""
+    given = sample(residual, starts, windows, responses)
     begin = first_law(windows)
     base = size_one(given, begin, None, None)
     slips = [size_one(given, begin, time, None, rival=base.log_likelihood) for time in SLIP_TIMES]
@@ -81,7 +79,7 @@ def size_noise(
     return memory.law if memory.log_likelihood > needed else base.law
 
 
-def steady_gain(residual: Array, starts: Array, windows: Windows, responses: Responses, use: Array, law: Law) -> float:
+def steady_gain(residual: Array, starts: Array, windows: Windows, responses: Responses, law: Law) -> float:
     """What a law's memory of the camera gains on the best law without one, both sized here, arguments as in
     `size_noise`; 0 where few windows bring it, or where wheels that slide sideways at random explain more: that is no
     camera.
@@ -89,7 +87,7 @@ def steady_gain(residual: Array, starts: Array, windows: Windows, responses: Res
     A window gains by its memory what it does not gain as well by the same law without that part: where few windows have
     large errors, the others gain by no longer being taken for as bad.
     """
-    given = sample(residual, starts, windows, responses, use)
+    given = sample(residual, starts, windows, responses)
     own = size_one(given, law, law.slip_time, law.coloured_time)
     without = max((size_one(given, first_law(windows), time, None) for time in (None, *SLIP_TIMES)), key=_likelihood)
     others = (without.law, own.law._replace(coloured=None, coloured_time=None))
@@ -117,10 +115,10 @@ def _by_window(given: Sample, law: Law) -> np.ndarray:
     return _weigh(residual, starts, parts, variances_of(law), of_unseen(windows, numbers))[0]
 
 
-def sample(residual: Array, starts: Array, windows: Windows, responses: Responses, use: Array) -> Sample:
+def sample(residual: Array, starts: Array, windows: Windows, responses: Responses) -> Sample:
     """What sizes the noise, of residuals (windows, numbers) and derivatives by start states (windows, numbers, 5)."""
-    chosen = np.flatnonzero(use)
-    chosen = chosen[np.unique(np.linspace(0, len(chosen) - 1, min(SAMPLE, len(chosen))).round().astype(int))]
+    count = len(windows.run)
+    chosen = np.unique(np.linspace(0, count - 1, min(SAMPLE, count)).round().astype(int))
     own = take(windows, chosen)
     part = Responses(*(leaf[chosen] for leaf in responses))
     length = len(own.seen)

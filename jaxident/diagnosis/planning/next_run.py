@@ -13,7 +13,6 @@ import jax
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.motion.coordinates import NOMINAL
 from jaxident.diagnosis.motion.linear import START_STATES, follow, gram, left_over, linearise
 from jaxident.diagnosis.motion.paths import track
 from jaxident.diagnosis.motion.responses import respond
@@ -21,6 +20,7 @@ from jaxident.diagnosis.motion.windows import Windows, cut, uncut
 from jaxident.diagnosis.noise.law import whitener_of
 from jaxident.diagnosis.planning.question import Question, ask, check_names, expected_size, noise_of
 from jaxident.diagnosis.planning.trial_inputs import ORDINARY, draw, make, vary
+from jaxident.effects.coordinates import NOMINAL
 from jaxident.log import Log, make_log
 from jaxident.numerics import require_float64
 from jaxident.robot.model import Model
@@ -91,7 +91,7 @@ def separations(question: Question, commands: Array) -> np.ndarray:
     t, run = np.tile(question.period * np.arange(samples), count), np.repeat(np.arange(count), samples)
     right, left = commands.reshape(-1, 2).T
     log = make_log(t, right, left, x, y, theta, run)
-    windows = cut(log, question.rows, session=np.zeros(count))
+    windows = cut(log, question.rows)._replace(session=np.zeros(count))
     starts = states[:, windows.first, windows.run]
     linear = linearise(question.base, starts, windows, list(range(len(NOMINAL))))
     moved = follow(question.vectors, np.broadcast_to(starts, (len(question.vectors), *starts.shape)), windows)

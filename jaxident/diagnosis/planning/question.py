@@ -6,7 +6,11 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.scores import seeded, seeds
-from jaxident.diagnosis.motion.coordinates import (
+from jaxident.diagnosis.noise.law import Law
+from jaxident.diagnosis.prepare import BURN, horizon_rows
+from jaxident.diagnosis.translate import scaled
+from jaxident.effects.catalogue import CATALOGUE
+from jaxident.effects.coordinates import (
     COORDINATES,
     SHAPES,
     SILENT,
@@ -16,10 +20,6 @@ from jaxident.diagnosis.motion.coordinates import (
     nominal_vector,
     unit_factors,
 )
-from jaxident.diagnosis.noise.law import Law
-from jaxident.diagnosis.prepare import BURN, horizon_rows
-from jaxident.diagnosis.translate import scaled
-from jaxident.effects.catalogue import CATALOGUE
 from jaxident.errors import InputError
 from jaxident.robot.model import Model, require_physical
 from jaxident.robot.noise import Noise

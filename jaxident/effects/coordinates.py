@@ -11,9 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.effects.catalogue import CATALOGUE
+from jaxident.effects.catalogue import CATALOGUE, by_name, to_vector
 from jaxident.effects.entry import UNIT
 from jaxident.robot.drive import Physical
+from jaxident.robot.model import Model, require_physical
 
 NOMINAL = ("rate_1", "rate_2", "gain_11", "gain_12", "gain_21", "gain_22", "dead_zone_r", "dead_zone_l",
            "coupling_1", "coupling_2")  # fmt: skip
@@ -211,3 +212,21 @@ def nominal_vector(drive: Physical, dead_zone: Array) -> np.ndarray:
 def natural(nominal: Array) -> np.ndarray:
     """The nominal coordinates with rates in 1/s."""
     return np.concatenate([np.exp(nominal[:2]), nominal[2:10]])
+
+
+COMMAND_POWERS = np.array([0, 0, -1, -1, -1, -1, 1, 1, 0, 0])
+"""How the nominal parameters scale with the unit of the command."""
+
+
+def vector_of(model: Model, largest: float = 1.0) -> np.ndarray:
+    """The coordinates (SIZE,) of a physical model, its effects included, for commands over `largest`; what is random in
+    it has none. InputError for a model of free numerators."""
+    point = nominal_vector(require_physical(model), np.asarray(model.dead_zone))
+    vector = neutral_vector(np.concatenate([point[:2], point[2:] / largest ** COMMAND_POWERS[2:]]))
+    whole = by_name(np.asarray(to_vector(model.effects)))
+    for name in (effect.name for effect in model.effects if effect.name in COORDINATES):
+        factors = unit_factors(name, largest)
+        values = from_catalogue(name, {key: float(v) / factors[key] for key, v in whole[name].items()})
+        for key, value in values.items():
+            vector[PLACES[name, key]] = value
+    return vector

@@ -30,6 +30,9 @@ PUSHING = (
 the play of their gears, on the nominal drive."""
 SUBSTEPS = 2
 """Per row; the nominal part is exact whatever their number."""
+RUN_UP = 3.0
+"""Commands [s] before a stretch that bring what the input remembers to where it stands: six time constants of the
+slowest lag that a search visits, and longer than any delay."""
 NODES = (0.21132486540518713, 0.7886751345948129)
 """Gauss-Legendre on a substep, of third degree."""
 JUST_BEFORE = 1e-9
@@ -46,11 +49,21 @@ class Push(NamedTuple):
 def pushes(settings, drive: Physical, dead_zone: Array, t: Array, session: Array, command: Array) -> Push:
     """The pushes of runs: t (rows, runs) [s], session (runs,) [s], command (rows, runs, 2); dead_zone (2,). drive: what
     tells the speed of wheels that coast."""
+    return expected_pushes(settings, drive, dead_zone, t, session, command, None)[0]
+
+
+def expected_pushes(
+    settings, drive: Physical, dead_zone: Array, t: Array, session: Array, command: Array, lost: Array | None
+) -> tuple[Push, Array | None]:
+    """The pushes that are to be expected where each command is lost with a probability, and the deviation of the jolts
+    (rows, runs, 2) that losing them makes (`_expected`); with None lost, as `pushes`, and None."""
     step = jnp.diff(t, axis=0, append=t[-1:] + 1.0)
     part = step / SUBSTEPS
-    asked = _asked(settings, dead_zone, t, session, command, part)
+    asked, jolt = _asked(settings, dead_zone, t, session, command, part), None
+    if lost is not None:
+        asked, jolt = _expected(asked, lost)
     asked = _delayed(asked, t, part, settings["transport_delay"]["delay"])
-    return _remembered(settings, drive, asked, part)
+    return _remembered(settings, drive, asked, part), jolt
 
 
 def _asked(settings, dead_zone: Array, t: Array, session: Array, command: Array, part: Array) -> Push:
@@ -77,6 +90,21 @@ def _asked(settings, dead_zone: Array, t: Array, session: Array, command: Array,
         means.append(0.5 * (early + late))
         slopes.append(6.0 * (NODES[1] - 0.5) * (late - early))
     return Push(jnp.stack(means, axis=2), jnp.stack(slopes, axis=2))
+
+
+def _expected(asked: Push, lost: Array) -> tuple[Push, Array]:
+    """Mean pushes where each command is lost with a probability p, and the one before stays in force: (1 - p) m + p of
+    the row before's; and the deviation (rows, runs, 2) of a jolt in that row that lasts as uncertain a time. A change
+    comes j rows late, j geometric: p / (1 - p) on average, with the deviation sqrt(p) / (1 - p)."""
+
+    def body(last, now):
+        mean, slope = now
+        arrived = (1.0 - lost) * mean + lost * last
+        return arrived[:, -1:], (arrived, (1.0 - lost) * slope, mean[:, 0] - last[:, 0])
+
+    begin = jnp.zeros_like(asked.mean[0, :, :1])
+    _, (mean, slope, change) = jax.lax.scan(body, begin, asked)
+    return Push(mean, slope), change * jnp.sqrt(lost) / (1.0 - lost)
 
 
 def _pair(settings, name: str) -> Array:

@@ -5,9 +5,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.extent.gap import CHANNELS
-from jaxident.diagnosis.motion.responses import modelled_path
-from jaxident.diagnosis.motion.windows import Windows
+from jaxident.diagnosis.account.judging import CHANNELS
+from jaxident.diagnosis.prepare import Prepared
+from jaxident.log import run_begins
 
 OF_COMMANDS = ("u_r", "u_l", "|u|", "largest |u|")
 """Variables in commands over their largest."""
@@ -40,13 +40,16 @@ class Place(NamedTuple):
 
 
 def locate(
-    errors: Array, floor: Array, residual: Array, windows: Windows, moved: Array | None = None, seed: int = 0
+    errors: Array, floor: Array, path: Array, prepared: Prepared, moved: Array | None = None, seed: int = 0
 ) -> Place:
-    """From the nominal model's squared errors and their floor (windows, 3) at the horizon, the residuals (windows,
-    numbers) of the best one, and the squares that its effects move (windows, 3), None without effects."""
+    """From the nominal model's squared errors and their floor (starts, 3) at the horizon, the best one's predicted poses
+    (starts, rows, 3), and the squares that its effects move (starts, 3), None without effects."""
     kept = np.isfinite(errors).all(axis=1)
+    if not kept.any():
+        nothing = dict.fromkeys(CHANNELS, 0.0)
+        return Place(nothing, nothing, [], {})
     excess = (errors - floor)[kept]
-    variables = {name: value[kept] for name, value in describe(residual, windows).items()}
+    variables = {name: value[kept] for name, value in describe(path, prepared).items()}
     beyond = _shares(excess)
     acting = beyond if moved is None else _shares(moved[kept])
     return Place(acting, beyond, *_regions(excess.mean(axis=1), variables, seed))
@@ -59,7 +62,7 @@ def _shares(squares: Array) -> dict[str, float]:
     return dict(zip(CHANNELS, share.tolist(), strict=True))
 
 
-def increments(path: tuple[Array, Array, Array]) -> np.ndarray:
+def increments(path: Any) -> np.ndarray:
     """Movement of a path (three of (windows, rows)) along, sideways and in heading (3, windows, rows - 1) from row to
     row, as the robot's own heading half-way sees it."""
     dx, dy, turned = (np.diff(column, axis=1) for column in path)
@@ -68,24 +71,27 @@ def increments(path: tuple[Array, Array, Array]) -> np.ndarray:
     return np.stack([cosine * dx + sine * dy, -sine * dx + cosine * dy, turned])
 
 
-def describe(residual: Array, windows: Windows) -> dict[str, np.ndarray]:
-    """What the robot did in each window (windows,): levels, speeds, reversals, rest, heading, position, time."""
-    x, y, theta = path = modelled_path(residual, windows)
-    step = np.asarray(windows.step).T
-    rows = np.arange(step.shape[1])
-    along, _, turned = increments(path)
-    v, w = along / step[:, :-1], turned / step[:, :-1]
-    places = np.minimum(windows.first + rows[:, None], len(windows.command) - 1)
-    u = np.asarray(windows.command)[places, windows.run]
+def describe(path: Array, prepared: Prepared) -> dict[str, np.ndarray]:
+    """What the robot did from each judging start to the horizon (starts,): levels, speeds, reversals, rest, heading,
+    position, time; path: predicted poses (starts, rows, 3)."""
+    log, starts, runs = prepared.log, prepared.judging, prepared.log.runs()
+    places = run_begins(log)[starts.run][:, None] + starts.row[:, None] + np.arange(prepared.rows)
+    u = np.nan_to_num(np.stack(log.command, axis=-1))[places] / prepared.largest
+    x, y, theta = np.moveaxis(path, 2, 0)
+    along, _, turned = increments((x, y, theta))
+    step = np.diff(np.asarray(log.t)[places], axis=1)
+    v, w = along / step, turned / step
+    passed = np.concatenate([[0.0], np.cumsum([run.t[-1] - run.t[0] for run in runs])])
+    time = passed[starts.run] + np.asarray(log.t)[places[:, 0]] - np.array([run.t[0] for run in runs])[starts.run]
     return {
-        "u_r": u[..., 0].mean(axis=0), "u_l": u[..., 1].mean(axis=0),
-        "|u|": np.abs(u).mean(axis=(0, 2)), "largest |u|": np.abs(u).max(axis=(0, 2)),
+        "u_r": u[..., 0].mean(axis=1), "u_l": u[..., 1].mean(axis=1),
+        "|u|": np.abs(u).mean(axis=(1, 2)), "largest |u|": np.abs(u).max(axis=(1, 2)),
         "v": v.mean(axis=1), "w": w.mean(axis=1), "|v|": np.abs(v).mean(axis=1), "|w|": np.abs(w).mean(axis=1),
         "v w": (v * w).mean(axis=1), "w^2": (w * w).mean(axis=1),
-        "reversals": (np.diff(np.sign(u), axis=0) != 0).sum(axis=(0, 2)).astype(float),
-        "rest": np.mean(np.abs(u) < 0.05, axis=(0, 2)),
+        "reversals": (np.diff(np.sign(u), axis=1) != 0).sum(axis=(1, 2)).astype(float),
+        "rest": np.mean(np.abs(u) < 0.05, axis=(1, 2)),
         "heading": np.arctan2(np.sin(theta), np.cos(theta))[:, -1], "x": x.mean(axis=1), "y": y.mean(axis=1),
-        "session time": windows.session[windows.run] + windows.t[windows.first, windows.run],
+        "session time": time,
     }  # fmt: skip
 
 

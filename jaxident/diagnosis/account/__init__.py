@@ -1,0 +1,1 @@
+"""How large the gap is before and after, who causes how many millimetres of it, and where it lies."""

@@ -1,0 +1,123 @@
+"""The account: who causes how many millimetres of the refitted nominal model's error on runs kept for judging.
+
+The mean squared error at the horizon is split into camera, start state, slip, every named effect and a rest. The share
+of an effect is its Shapley value (Shapley 1953): what adding it to the model takes away from the error, averaged over
+all orders of adding. A model with some of the effects has them at the size that all together were found with, and its
+nominal parameters refitted on the runs that fit: to first order that is what the robot's error would lose if the effect
+were switched off.
+"""
+
+import itertools
+from collections.abc import Callable
+from math import factorial
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxident.array_types import Array
+from jaxident.diagnosis.account.floor import Floor
+from jaxident.diagnosis.account.judging import CHANNELS
+from jaxident.diagnosis.account.shrink import HIGH, LOW, blocks
+
+CAMERA, START, SLIP, DISCOVERED, REST = "camera", "start", "slip", "discovered", "rest"
+
+
+class Row(NamedTuple):
+    """One part of the error: rms_position [m] and rms_heading [rad], negative where the part's mean square is; its
+    share of the mean over channels of squares over the camera's variance, with a 90 % interval; that of each channel.
+    """
+
+    part: str
+    rms_position: float
+    rms_heading: float
+    share: float
+    interval: tuple[float, float]
+    channels: dict[str, float]
+
+
+class Account(NamedTuple):
+    """Rows in the order camera, start, slip, effects, discovered, rest, whose shares add up to one, over the horizon [s]
+    from so many starts; `failed`: starts from which some model's prediction is not finite, which count in none."""
+
+    horizon: float
+    windows: int
+    failed: int
+    rows: list[Row]
+
+    def share(self, *parts: str) -> float:
+        """Of some parts together."""
+        return sum(row.share for row in self.rows if row.part in parts)
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """The effects that have a row."""
+        return tuple(row.part for row in self.rows if row.part not in (CAMERA, START, SLIP, DISCOVERED, REST))
+
+
+def shapley(players: tuple[str, ...], value: Callable[[frozenset[str]], Array]) -> dict[str, np.ndarray]:
+    """What each player takes away from `value`, an array for every set of them, averaged over all orders of joining."""
+    count = len(players)
+    found = {}
+    for player in players:
+        others, total = [name for name in players if name != player], 0.0
+        for size in range(count):
+            weight = factorial(size) * factorial(count - size - 1) / factorial(count)
+            for joined in itertools.combinations(others, size):
+                total = total + weight * (value(frozenset(joined)) - value(frozenset((*joined, player))))
+        found[player] = np.asarray(total)
+    return found
+
+
+def account_of(
+    horizon: float,
+    errors: dict[frozenset[str], Array],
+    players: tuple[str, ...],
+    floor: Floor,
+    unit: Array,
+    seed: int = 0,
+) -> Account:
+    """The account from errors (starts, 3) of the model with each set of players, and the floor of that with all of them;
+    unit (3,): the camera's variances."""
+    kept = np.all([np.isfinite(error).all(axis=1) for error in errors.values()], axis=0)
+    squares = {joined: error[kept] ** 2 for joined, error in errors.items()}
+    total, left = squares[frozenset()], squares[frozenset(players)]
+    parts = {CAMERA: floor.camera[kept], START: floor.start[kept], SLIP: floor.slip[kept]}
+    chance = {name: part[kept] for name, part in floor.chance.items()}
+    named = shapley(players, lambda joined: squares[joined])
+    for name in dict.fromkeys((*players, *chance)):
+        parts[name] = named.get(name, 0.0) + chance.get(name, 0.0)
+    parts[DISCOVERED] = np.zeros_like(total)
+    parts[REST] = left - floor.total[kept]
+    rows = _rows(parts, total, unit, floor, seed) if kept.any() else []
+    return Account(horizon, int(kept.sum()), int(np.sum(~kept)), rows)
+
+
+def _rows(parts: dict[str, Array], total: Array, unit: Array, floor: Floor, seed: int) -> list[Row]:
+    """One row per part; intervals by resampled starts, and by laws of noise as likely as the one chosen."""
+    picks = blocks(np.random.default_rng(seed), len(total), len(floor.draws))
+    whole, drawn = np.mean(total / unit), np.mean(total / unit, axis=1)[picks].mean(axis=1)
+    slipping = floor.draws - floor.steady
+    rows = []
+    for name, part in parts.items():
+        mean = np.mean(part, axis=0)
+        spread = np.mean(part / unit, axis=1)[picks].mean(axis=1)
+        if name == REST:
+            spread = spread - (floor.draws - np.mean(floor.draws))
+        elif name in (CAMERA, START):
+            spread = spread * floor.steady / float(np.mean(floor.steady))
+        elif name == SLIP and np.mean(slipping) > 0.0:
+            spread = spread * slipping / float(np.mean(slipping))
+        share = float(np.mean(mean / unit) / whole)
+        low, high = np.quantile(spread / drawn, [LOW, HIGH])
+        channels = mean / unit
+        size = channels.sum() if abs(channels.sum()) > 0.0 else 1.0
+        rows.append(Row(
+            name, _root(mean[0] + mean[1]), _root(mean[2]), share, (min(float(low), share), max(float(high), share)),
+            dict(zip(CHANNELS, (channels / size).tolist(), strict=True)),
+        ))  # fmt: skip
+    return rows
+
+
+def _root(square: float) -> float:
+    """The root of a mean square, with its sign."""
+    return float(np.sign(square) * np.sqrt(abs(square)))

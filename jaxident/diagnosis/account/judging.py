@@ -1,0 +1,56 @@
+"""How a model predicts the rows kept for judging: by `run_ahead`, as `predict` does, on poses as they were measured."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jaxident.array_types import Array
+from jaxident.diagnosis.prepare import BURN, Prepared
+from jaxident.estimation.run_ahead import run_ahead
+from jaxident.log import run_begins
+from jaxident.robot.model import Model
+
+CHANNELS = ("along", "lateral", "heading")
+
+
+class Judged(NamedTuple):
+    """One model at the horizon of every judging start, along, lateral [m] and in heading [rad] as the measured heading
+    there sees it.
+
+    error (starts, 3): measured less predicted, NaN where the prediction is not finite; start, slip (starts, 3):
+    expected squares by what is not known of the start state, and by slip since; slopes (directions, starts, 3): a
+    deviation's worth of each independent direction of the model's parameters; path (starts, rows, 3): predicted poses;
+    run_up (starts,): starts where the filter did not converge.
+    """
+
+    error: Any
+    start: Any
+    slip: Any
+    slopes: Any
+    path: Any
+    run_up: Any
+
+
+def judge_model(model: Model, prepared: Prepared) -> Judged:
+    """The model's predictions against the poses measured at the horizon."""
+    log, starts, rows = prepared.log, prepared.judging, prepared.rows
+    ahead = run_ahead(model, log, starts, rows, burn_in=BURN, session_time=0.0)
+    measured = np.stack(log.pose, axis=1)[run_begins(log)[starts.run] + starts.row + rows]
+    error = measured - ahead.pose[:, -1]
+    error[:, 2] = (error[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
+    turn = into_channels(measured[:, 2])
+    start, slip = (
+        np.diagonal(turn @ part[:, -1] @ turn.transpose(0, 2, 1), axis1=1, axis2=2)
+        for part in (ahead.start, ahead.slip)
+    )
+    slopes = np.einsum("sij,dsj->dsi", turn, ahead.parameters[:, :, -1])
+    return Judged((turn @ error[..., None])[..., 0], start, slip, slopes, ahead.pose, ahead.run_up)
+
+
+def into_channels(heading: Array) -> np.ndarray:
+    """Matrices (n, 3, 3) that take x, y, heading into along, lateral, heading."""
+    turn = np.zeros((len(heading), 3, 3))
+    turn[:, 0, 0] = turn[:, 1, 1] = np.cos(heading)
+    turn[:, 0, 1], turn[:, 1, 0] = np.sin(heading), -np.sin(heading)
+    turn[:, 2, 2] = 1.0
+    return turn

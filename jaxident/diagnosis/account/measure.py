@@ -1,0 +1,160 @@
+"""The gap on rows kept for judging: before, refitted, corrected; who causes it; where it lies; how far each effect shrinks
+it."""
+
+import dataclasses
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jaxident.array_types import Array
+from jaxident.diagnosis.account.account import Account, account_of
+from jaxident.diagnosis.account.floor import Floor, floor_of
+from jaxident.diagnosis.account.judging import Judged, judge_model
+from jaxident.diagnosis.account.models import corrected_of, players_of, single, with_players, without
+from jaxident.diagnosis.account.shrink import HIGH, LOW, Shrink, interval, shrink_of
+from jaxident.diagnosis.account.where import Place, increments, locate
+from jaxident.diagnosis.causes.candidates import Finding
+from jaxident.diagnosis.causes.unexplained import UNEXPLAINED
+from jaxident.diagnosis.motion.responses import respond
+from jaxident.diagnosis.noise.doubt import Draws, draw_laws, sizes_by_memory
+from jaxident.diagnosis.noise.law import Law, deviations
+from jaxident.diagnosis.noise.sizing import Sized, sample
+from jaxident.diagnosis.prepare import Prepared
+from jaxident.robot.model import Model
+
+REPLAYS = 500
+"""Laws of noise, and robots, drawn as likely as the fit leaves them."""
+
+
+SHOWN = 4
+"""Effects alone, the best of them, whose shrink is told."""
+
+
+class Gap(NamedTuple):
+    """Mean squared pose error over the camera's variance at the horizon [s], three channels alike, on rows used for
+    nothing else: the model as given, refitted, with the selected effects; the floor and its 90 % interval; the shrink.
+    `placebo`: the shrink of an effect that nothing speaks for. errors (models, starts, 3): before, refitted, after, as
+    squares over the camera's variances `unit` (3,) [m^2, m^2, rad^2]; noise: the floor of each start; run_up: starts of
+    the corrected model where its filter did not converge."""
+
+    horizon: float
+    before: float
+    refitted: float
+    after: float
+    floor: float
+    floor_interval: tuple[float, float]
+    shrink: Shrink
+    placebo: tuple[str, Shrink] | None
+    errors: Any
+    noise: Floor
+    unit: Any
+    run_up: int
+
+    @property
+    def rms(self) -> dict[str, tuple[float, float]]:
+        """Root mean square errors in position [m] and heading [rad] of the models and of the floor; `discovered` is the
+        corrected model's as long as nothing is discovered."""
+        kept = np.isfinite(self.errors).all(axis=(0, 2))
+        names = ("before", "refitted", "after")
+        squares = {name: own[kept] * self.unit for name, own in zip(names, self.errors, strict=True)}
+        squares |= {"discovered": squares["after"], "floor": self.noise.total[kept] if kept.any() else squares["after"]}
+        return {name: (_root(own[:, 0] + own[:, 1]), _root(own[:, 2])) for name, own in squares.items()}
+
+    @property
+    def left(self) -> float:
+        """The part of the refitted nominal model's error that the corrected one leaves, floor and all."""
+        return self.after / max(self.refitted, 1e-9)
+
+    @property
+    def excess(self) -> float:
+        """The corrected model's error, at the low end of its interval, over the high end of what noise makes."""
+        errors = np.asarray(self.errors[2])
+        seen = np.isfinite(errors).all(axis=1).any()
+        return interval(errors)[0] / max(self.floor_interval[1], 1e-9) if seen else 0.0
+
+
+def _root(squares: Array) -> float:
+    """The root of a mean; 0 of nothing."""
+    return float(np.sqrt(np.mean(squares))) if len(squares) else 0.0
+
+
+class Measured(NamedTuple):
+    """All that the judging rows tell, and the corrected model of which they tell it."""
+
+    gap: Gap
+    account: Account
+    where: Place
+    shrinks: dict[str, Shrink]
+    model: Model
+
+
+def measure(prepared: Prepared, finding: Finding, given: Model | None, common, direct: dict, seed: int = 0) -> Measured:
+    """The gap before and after, the account, where it lies, and the shrink of each single effect; `given` is the model
+    as given, `common` are effects that it has already, `direct` parameters of effects that show without a refit."""
+    law, draws = _laws(finding, seed)
+    corrected = corrected_of(prepared, finding, law, direct)
+    bare = dataclasses.replace(corrected.model, covariance=None, parameter_order=())
+    players = players_of(corrected, common)
+    judged: dict[frozenset[str], Judged] = {
+        joined: judge_model(model, prepared) for joined, model in with_players(prepared, finding, corrected, players)
+    }
+    nobody, everybody = judged[frozenset()], judged[frozenset(players)]
+    told = None if given is None else dataclasses.replace(given, noise=corrected.model.noise)
+    before = nobody if told is None else judge_model(told, prepared)
+    floor = floor_of(corrected.model, everybody, prepared, law, draws)
+    unit = deviations(law) ** 2
+    account = account_of(prepared.horizon, {k: j.error for k, j in judged.items()}, players, floor, unit, seed)
+    errors = np.stack([one.error**2 / unit for one in (before, nobody, everybody)])
+    regular = bool(finding.terms) and law.slip is not None
+    # terms left over are regular: so may be what the law calls slip, and then it is still to explain
+    least = floor.steady if regular else None
+    level = float(np.mean(floor.total / unit))
+
+    def shrink(model: Judged) -> Shrink:
+        return shrink_of(errors[1], model.error**2 / unit, level, floor.draws, _wander(model, unit, seed), seed, least)
+
+    alone = sorted((c for e, c in finding.candidates.items() if len(e) == 1), key=lambda c: -c.gain)
+    told_alone = [*alone[:SHOWN], *alone[SHOWN:][-1:]]
+    shrinks = {c.effects[0]: shrink(judge_model(single(prepared, c, law), prepared)) for c in told_alone}
+    placebo = (alone[-1].effects[0], shrinks[alone[-1].effects[0]]) if alone else None
+    kept = np.isfinite(errors).all(axis=(0, 2))
+    means = [float(np.mean(own[kept])) if kept.any() else float("nan") for own in errors]
+    ends = tuple(float(q) for q in np.quantile(floor.draws, [LOW, HIGH]))
+    gap = Gap(prepared.horizon, *means, level, (ends[0], ends[1]), shrink(everybody), placebo, errors, floor, unit,
+              int(everybody.run_up.sum()))  # fmt: skip
+    moved = None
+    if players and finding.unexplained <= UNEXPLAINED:
+        moved = _moved(everybody, judge_model(without(bare, players), prepared), unit)
+    place = locate(errors[1], floor.total / unit, everybody.path, prepared, moved, seed)
+    return Measured(gap, account, place, shrinks, corrected.model)
+
+
+def _laws(finding: Finding, seed: int) -> tuple[Law, Draws]:
+    """The law that the floor takes, and draws of laws as likely. Slip's memory is sized finely, unless something
+    is left unexplained, which slip would take up."""
+    best, windows = finding.candidates[finding.selected].solution, finding.data.windows
+    fitted = respond(np.exp(best.vector[:2]), best.linear.residual, windows)
+    given = sample(best.linear.residual, best.linear.starts, windows, fitted)
+    unknown = finding.unexplained > UNEXPLAINED
+    sizes = [Sized(finding.law, 0.0)] if unknown else sizes_by_memory(finding.likely, given)
+    likeliest = max(sizes, key=lambda sized: sized.log_likelihood).law
+    return likeliest, draw_laws(sizes, given, REPLAYS, seed)
+
+
+def _wander(judged: Judged, unit: Array, seed: int) -> np.ndarray:
+    """Mean squared errors (draws,) over the camera's variances that the uncertainty of a model's own parameters makes:
+    the least that it can miss by."""
+    normal = np.random.default_rng(seed).normal(size=(len(judged.slopes), REPLAYS))
+    moved = np.einsum("dsi,dn->nsi", judged.slopes, normal)
+    return np.nanmean(moved**2 / unit, axis=(1, 2)) if len(normal) else np.zeros(REPLAYS)
+
+
+def _moved(corrected: Judged, bare: Judged, unit: Array) -> np.ndarray:
+    """Squares (starts, 3) over the camera's variances of what the effects add to the movement along, sideways and in
+    heading from row to row, all else alike.
+
+    The refitted nominal model's own error would say less: its parameters bend until some of what an effect does in
+    one channel lies in another, and an error of heading soon lies sideways.
+    """
+    both = (increments(np.moveaxis(one.path, 2, 0)) for one in (corrected, bare))
+    return np.sum(np.subtract(*both) ** 2, axis=2).T / unit

@@ -1,0 +1,89 @@
+"""The models that are judged: the corrected one, and it with some of its effects only, nominal parameters refitted."""
+
+import dataclasses
+import itertools
+from collections.abc import Collection, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jaxident.diagnosis.causes.candidates import Candidate, Finding
+from jaxident.diagnosis.causes.search import Data, refit
+from jaxident.diagnosis.noise.law import Law
+from jaxident.diagnosis.prepare import Prepared
+from jaxident.diagnosis.translate import to_model
+from jaxident.effects.coordinates import COORDINATES, NOMINAL, PLACES, neutral_vector
+from jaxident.robot.model import Model
+
+LOST = "lost_commands"
+"""Chance that bends the mean path, too: a change of command comes later on average."""
+
+
+class Corrected(NamedTuple):
+    """The corrected model, its law of noise, effects found by the search, and parameters of those that show without."""
+
+    model: Model
+    law: Law
+    selected: tuple[str, ...]
+    direct: dict[str, Any]
+
+
+def corrected_of(prepared: Prepared, finding: Finding, law: Law, direct: dict) -> Corrected:
+    """The selected set as a model."""
+    fit = finding.candidates[finding.selected].solution
+    return Corrected(to_model(prepared, fit.vector, law, finding.selected, direct, fit), law, finding.selected, direct)
+
+
+def players_of(corrected: Corrected, common: Collection[str]) -> tuple[str, ...]:
+    """Effects that bend the mean path and that the given model has not."""
+    chance = [LOST] if LOST in corrected.direct else []
+    return tuple(name for name in (*corrected.selected, *chance) if name not in common)
+
+
+def with_players(
+    prepared: Prepared, finding: Finding, corrected: Corrected, players: tuple[str, ...]
+) -> Iterator[tuple[frozenset[str], Model]]:
+    """The corrected model with each set of its players: effects at the size that all were found with, and the nominal
+    parameters refitted on the rows that fit, as if the others were nowhere."""
+    fixed = {*corrected.selected, *corrected.direct} - set(players)
+    for count in range(len(players) + 1):
+        for joined in itertools.combinations(players, count):
+            if count == len(players):
+                yield frozenset(joined), corrected.model
+            else:
+                yield frozenset(joined), _refitted(prepared, finding, corrected, {*fixed, *joined})
+
+
+def _refitted(prepared: Prepared, finding: Finding, corrected: Corrected, kept: set[str]) -> Model:
+    """The model with some effects of the corrected one."""
+    names = tuple(name for name in corrected.selected if name in kept)
+    direct = {name: values for name, values in corrected.direct.items() if name in kept}
+    found = finding.candidates[corrected.selected].solution
+    begin = found if 2 * len(names) >= len(corrected.selected) else finding.nominal
+    vector = neutral_vector(begin.vector[: len(NOMINAL)])
+    places = [place for (name, _), place in PLACES.items() if name in names]
+    vector[places] = found.vector[places]
+    data: Data = finding.data
+    if prepared.sent is not None and LOST not in kept:
+        data = data._replace(windows=data.windows._replace(command=prepared.sent))
+    elif not names:
+        return to_model(prepared, finding.nominal.vector, corrected.law, (), direct)
+    fit = refit(data, vector, begin.starts, ())
+    return to_model(prepared, fit.vector, corrected.law, names, direct)
+
+
+def without(model: Model, effects: Collection[str]) -> Model:
+    """The model without some effects, all else alike."""
+    return dataclasses.replace(model, effects=tuple(e for e in model.effects if e.name not in effects))
+
+
+def single(prepared: Prepared, candidate: Candidate, law: Law) -> Model:
+    """A candidate as a model."""
+    return to_model(prepared, candidate.solution.vector, law, candidate.effects)
+
+
+def as_model(prepared: Prepared, vector: np.ndarray, law: Law, effects: Collection[str], direct: dict) -> Model:
+    """Coordinates (10,) or (SIZE,) of a simulator with some effects as a model, judged under a law."""
+    whole = vector if len(vector) > len(NOMINAL) else neutral_vector(vector)
+    chance = {name: values for name, values in direct.items() if name in effects}
+    return to_model(prepared, whole, law, tuple(name for name in COORDINATES if name in effects), chance)

@@ -1,1 +1,0 @@
-"""How large the gap is, before and after, and where it lies."""

@@ -1,0 +1,231 @@
+"""The filtered state of a robot with or without effects, and its free run from there: the one way to predict.
+
+An extended Kalman filter (Jazwinski 1970, section 8.3) over the rows before the start, in the coordinates of
+`effects.coordinates`. What the input remembers (delay, slew, play, lag) follows from the commands alone and is run up
+from rest; pose, speeds, random slip and a camera error with a memory are filtered. Derivatives by differences of the
+fast integrator serve effects with corners as well. Stretches lie on the last axis.
+"""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxident.array_types import Array, State, Wheels
+from jaxident.effects.coordinates import by_effect
+from jaxident.effects.fast_input import SUBSTEPS, expected_pushes
+from jaxident.effects.fast_motion import Row, advance_row, drive_of, lags_of, report
+from jaxident.numerics import wrap
+from jaxident.robot.drive import force
+from jaxident.robot.noise import Noise
+
+STEPS = (1e-6, 1e-5, 1e-4, 1e-4, 1e-3)
+"""Steps of the differences: heading [rad], v [m/s], w [rad/s], slip along [m/s^2] and in heading [rad/s^2]."""
+NUDGE = 1e-6
+"""Step of the differences of the camera by a pose [m], [rad]."""
+WIDE = (0.1, 0.1, 0.3, 1.0, 10.0)
+"""Deviations of the state about its first guess [m, m, rad, m/s, rad/s], before its first pose is taken in."""
+LIMIT, DOUBT = 5.0, 2.0
+"""Standard deviations beyond which a pose is not taken in, an outlier among the last of which must not throw the start;
+and what the covariance is multiplied with instead: where poses go on to disagree, it is the state that is wrong."""
+
+
+class Stretch(NamedTuple):
+    """Rows of a log side by side: t (rows, n) [s] since the first row, session time (n,) [s] there, command (rows, n,
+    2), pose (rows, n, 3), seen (rows, n): poses that the filter takes in. first (n,): row of the first of them, from
+    which on it filters; speeds (2, n) along and in heading: the guess there, NaN keeps those of the run-up from rest.
+    begin (n,): row at which its run begins, moving as it may, or 0.
+    """
+
+    t: Any
+    session: Any
+    command: Any
+    pose: Any
+    seen: Any
+    first: Any
+    speeds: Any
+    begin: Any
+
+
+class Run(NamedTuple):
+    """What the filter says of each row, then the free run: the pose that the camera would report (rows, 3, n), the
+    covariance (rows, 3, 3, n) of its error by what is not known at the start row, and by the slip since; squared
+    normalised innovations (rows, n), none beyond LIMIT, summed over the three channels."""
+
+    pose: Any
+    start: Any
+    slip: Any
+    innovation: Any
+
+
+class _Belief(NamedTuple):
+    """Mean (states, n), the two parts of the covariance (states, states, n), and the excess speed of both wheels."""
+
+    mean: Any
+    start: Any
+    slip: Any
+    excess: Any
+
+
+def filter_and_run(vector: Array, noise: Noise, lost: Array | None, stretch: Stretch, before: int) -> Run:
+    """The filter up to row `before`, that row's pose included, and the free run after it; pure.
+
+    vector (SIZE,): coordinates for the commands as they stand in the stretch. lost: the probability that a command
+    never arrives, None without. States are x, y, theta, v, w; then slip along and in heading where `noise.slip_time` is
+    given, and the camera's errors where its `correlation_time` is.
+    """
+    settings, drive = by_effect(vector), drive_of(vector)
+    t = stretch.t
+    step = jnp.diff(t, axis=0, append=2.0 * t[-1:] - t[-2:-1])
+    push, jolt = expected_pushes(settings, drive, vector[6:8], t, stretch.session, stretch.command, lost)
+    part = step / SUBSTEPS
+    mean, slope = (leaf.transpose(0, 2, 3, 1) for leaf in push)
+    jolt = None if jolt is None else jnp.stack(force(drive, Wheels(*jnp.moveaxis(jolt, 2, 0))), axis=1)
+    rows = Row(mean, slope, part, lags_of(drive, part), stretch.session + t)
+    number = jnp.arange(len(t))
+    size = 5 + 2 * (noise.slip_time is not None) + 3 * (noise.correlation_time is not None)
+    none = jnp.zeros((size, t.shape[1]))
+    begin = _Belief(none, *[jnp.zeros((size, *none.shape))] * 2, [none[0]] * 2)
+    wide = _wide(noise)
+
+    def body(belief, now):
+        k, row, own, pose, seen, jolt = now
+        belief = belief._replace(start=jnp.where(k == stretch.begin, wide, belief.start))
+        belief = _opened(settings, wide, belief, pose, stretch.speeds, k == stretch.first)
+        belief, innovation = _take_in(settings, noise, belief, pose, seen & (k >= stretch.first) & (k <= before))
+        shown, camera = _seen_by(settings, belief.mean)
+        told = [_between(camera, part[:3, :3]) for part in (belief.start, belief.slip)]
+        belief = _one_row_on(settings, drive, noise, belief, row, own, jolt, k >= before)
+        return belief, (shown, *told, innovation)
+
+    return Run(*jax.lax.scan(body, begin, (number, rows, step, stretch.pose, stretch.seen, jolt))[1])
+
+
+def _wide(noise: Noise) -> Array:
+    """Covariance (states, states, 1) of a state of which next to nothing is known."""
+    variances = [*(deviation**2 for deviation in WIDE), *_stationary(noise)]
+    return jnp.diag(jnp.stack([jnp.asarray(value, float) for value in variances]))[..., None]
+
+
+def _opened(settings, wide: Array, belief: _Belief, pose: Array, speeds: Array, here: Array) -> _Belief:
+    """Where the filter begins: at the robot whose reported pose is the first, hardly known; at some speeds, hardly known
+    either, or at those of the run-up, as well as it knows them."""
+    mean, start, slip, excess = belief
+    x, y, theta = pose.T
+    for _ in range(3):  # the camera moves a pose by little that depends on it
+        shown = report(settings, x, y, theta)
+        x, y, theta = (a + b - c for a, b, c in zip((x, y, theta), pose.T, shown, strict=True))
+    guessed = jnp.isfinite(speeds).all(axis=0)
+    v, w = (jnp.where(guessed, guess, own) for guess, own in zip(speeds, mean[3:5], strict=True))
+    fresh = jnp.concatenate([jnp.stack([x, y, theta, v, w]), mean[5:]])
+    kept = jnp.arange(len(mean)) >= jnp.where(guessed, 5, 3)[:, None]
+    known = jnp.where((kept[:, :, None] & kept[:, None, :]).transpose(1, 2, 0), start, wide)
+    return _Belief(jnp.where(here, fresh, mean), jnp.where(here, known, start), jnp.where(here, 0.0, slip), excess)
+
+
+def _stationary(noise: Noise) -> list[Array]:
+    """Variances of the slip and of the camera's errors in the long run, as far as they are states."""
+    found: list[Array] = []
+    if noise.slip_time is not None:
+        found += [density**2 / (2.0 * noise.slip_time) for density in (noise.slip_along, noise.slip_heading)]
+    if noise.correlation_time is not None:
+        position, heading = (whole**2 - white**2 for whole, white in _camera(noise))
+        found += [position, position, heading]
+    return found
+
+
+def _camera(noise: Noise) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    """Deviations of the whole camera error and of its white part, in position and in heading."""
+    white = (0.0 if part is None else part for part in (noise.white_position, noise.white_heading))
+    position, heading = zip((noise.position, noise.heading), white, strict=True)
+    return position, heading
+
+
+def _take_in(settings, noise: Noise, belief: _Belief, pose: Array, seen: Array) -> tuple[_Belief, Array]:
+    """The belief after a pose (n, 3), one coordinate after the other, and the squares of its normalised innovations."""
+    mean, covariance = belief.mean, belief.start
+    memory = noise.correlation_time is not None
+    shown, camera = _seen_by(settings, mean)
+    error = pose.T - shown - (mean[-3:] if memory else 0.0)
+    error = error.at[2].set(wrap(error[2]))
+    whole, total, far = mean, 0.0, jnp.zeros_like(seen)
+    for k, (sd, white) in enumerate((_camera(noise)[0], *_camera(noise))):
+        weights = jnp.zeros_like(mean).at[:3].set(camera[k])
+        weights = weights.at[k - 3].add(1.0) if memory else weights
+        shared = jnp.sum(covariance * weights, axis=1)
+        variance = jnp.sum(weights * shared, axis=0) + (white if memory else sd) ** 2
+        left = error[k] - jnp.sum(weights * (mean - whole), axis=0)
+        gain = shared / variance
+        mean = mean + gain * left
+        covariance = covariance - gain[:, None] * shared
+        square = jnp.minimum(left**2 / variance, LIMIT**2)
+        total, far = total + jnp.where(seen, square, 0.0), far | (square == LIMIT**2)
+    taken = seen & ~far
+    mean, doubtful = jnp.where(taken, mean, belief.mean), jnp.where(seen, DOUBT, 1.0) * belief.start
+    return belief._replace(mean=mean, start=jnp.where(taken, covariance, doubtful)), total
+
+
+def _seen_by(settings, mean: Array) -> tuple[Array, Array]:
+    """The reported pose (3, n) of a state (states, n), and its derivatives (3, 3, n) by the true one."""
+    nudged = mean[:3, None] + NUDGE * jnp.eye(4)[1:, :, None]  # the first lane as it stands
+    lanes = jnp.stack(report(settings, *nudged))
+    return lanes[:, 0], (lanes[:, 1:] - lanes[:, :1]) / NUDGE
+
+
+def _between(left: Array, middle: Array) -> Array:
+    """left middle left' of matrices (3, 3, n)."""
+    return _times(_times(left, middle), jnp.swapaxes(left, 0, 1))
+
+
+def _times(left: Array, right: Array) -> Array:
+    return jnp.sum(left[:, :, None] * right[None], axis=1)
+
+
+def _one_row_on(settings, drive, noise: Noise, belief: _Belief, row: Row, step: Array, jolt, free: Array) -> _Belief:
+    """The belief one row later; what is random in it counts as slip once the run is free. jolt (2, n): deviation of an
+    acceleration by commands that may have been lost, None without."""
+    mean, start, slip, excess = belief
+    moved, slopes, excess = _moved(settings, drive, noise, mean, excess, row)
+    size = len(mean)
+    change = jnp.zeros((size, size, mean.shape[1]))
+    change = change.at[jnp.arange(2), jnp.arange(2)].set(1.0).at[:5, 2:5].set(slopes[:, :3])
+    fresh = jnp.zeros_like(change)
+    kept, entry = [], slopes[:, 3:]
+    if noise.slip_time is None:
+        pushed = [density**2 / step for density in (noise.slip_along, noise.slip_heading)]
+        fresh = fresh.at[:5, :5].set(sum(p * entry[:, None, k] * entry[None, :, k] for k, p in enumerate(pushed)))
+    else:
+        change = change.at[:5, 5:7].set(entry)
+        kept += [jnp.exp(-step / noise.slip_time)] * 2
+    if noise.correlation_time is not None:
+        kept += [jnp.exp(-step / noise.correlation_time)] * 3
+    if jolt is not None:
+        moved_by = jnp.sum(entry * jolt, axis=1)
+        fresh = fresh.at[:5, :5].add(moved_by[:, None] * moved_by)
+    for k, (share, variance) in enumerate(zip(kept, _stationary(noise), strict=True), start=5):
+        change, fresh = change.at[k, k].set(share), fresh.at[k, k].set((1.0 - share**2) * variance)
+    travelled = jnp.sum((moved[:2] - mean[:2]) ** 2, axis=0)
+    start_bend = _bend(start, step, travelled)
+    mean = jnp.concatenate([moved, *(share[None] * mean[k : k + 1] for k, share in enumerate(kept, start=5))])
+    start, slip = (_times(_times(change, part), jnp.swapaxes(change, 0, 1)) for part in (start, slip))
+    start = start.at[jnp.arange(2), jnp.arange(2)].add(start_bend)
+    return _Belief(mean, start + jnp.where(free, 0.0, fresh), slip + jnp.where(free, fresh, 0.0), excess)
+
+
+def _bend(covariance: Array, step: Array, travelled: Array) -> Array:
+    """Variance (n,) of x and of y by what a linearisation leaves out where heading and speed are uncertain together."""
+    heading = covariance[2, 2] + 0.25 * step**2 * covariance[4, 4]
+    return heading * step**2 * covariance[3, 3] + 0.5 * heading**2 * travelled
+
+
+def _moved(settings, drive, noise: Noise, mean: Array, excess, row: Row):
+    """The state (5, n) one row later, its derivatives (5, 5, n) by heading, v, w and a slip along and in heading, and
+    the excess speeds."""
+    x, y, theta, v, w = mean[:5]
+    slip = mean[5:7] if noise.slip_time is not None else jnp.zeros_like(mean[:2])
+    nudge = jnp.diag(jnp.array(STEPS)) @ jnp.eye(5, 6, 1)
+    theta, v, w, *slip = (a + d[:, None] for a, d in zip((theta, v, w, *slip), nudge, strict=True))
+    lanes, excess = advance_row(settings, drive, State(x, y, theta, v, w), excess, row, slip)
+    lanes = jnp.stack([jnp.broadcast_to(part, theta.shape) for part in lanes])
+    slopes = (lanes[:, 1:] - lanes[:, :1]) / jnp.array(STEPS)[:, None]
+    return lanes[:, 0], slopes, [jnp.broadcast_to(one, theta.shape)[0] for one in excess]

@@ -1,0 +1,74 @@
+"""Robots as likely as a model's covariance says: what its parameters' uncertainty does to anything computed from it."""
+
+import dataclasses
+from collections.abc import Mapping
+
+import numpy as np
+
+from jaxident.array_types import Array
+from jaxident.robot.drive import Physical
+from jaxident.robot.model import Model, require_physical
+
+STEP = 1e-4
+"""Part of a parameter's size, or of its deviation if that is smaller, by which a robot is moved."""
+
+
+def directions(model: Model) -> list[tuple[Model, float]]:
+    """Robots moved along the independent directions of the model's covariance, and by how many deviations each; none
+    for a model without. What changes from the model to one of them, over that number, is one deviation's worth."""
+    values = parameter_values(model)
+    own = [k for k, name in enumerate(model.parameter_order) if name in values]
+    if model.covariance is None or not own:
+        return []
+    names = [model.parameter_order[k] for k in own]
+    here = np.array([values[name] for name in names])
+    found = []
+    for direction in _roots(np.asarray(model.covariance, float)[np.ix_(own, own)]):
+        size = STEP * min(1.0, float(np.min(np.abs(_sizes(names, here)) / np.maximum(np.abs(direction), 1e-300))))
+        found.append((with_values(model, dict(zip(names, here + size * direction, strict=True))), size))
+    return found
+
+
+def _roots(covariance: Array) -> np.ndarray:
+    """Rows (n, n) whose outer products add up to a covariance (n, n)."""
+    deviation = np.sqrt(np.maximum(np.diagonal(covariance), 1e-300))
+    values, vectors = np.linalg.eigh(covariance / deviation / deviation[:, None])
+    return (vectors * np.sqrt(np.maximum(values, 0.0))).T * deviation
+
+
+def _sizes(names: list[str], values: Array) -> np.ndarray:
+    """Typical sizes (n,) of parameters: their own, or that of the largest of their kind where they are next to
+    nothing."""
+    kinds = [name.rsplit("_", 1)[0] if "." not in name else name for name in names]
+    largest = {kind: max(abs(v) for k, v in zip(kinds, values, strict=True) if k == kind) for kind in kinds}
+    return np.array([max(largest[kind], 1e-6) for kind in kinds])
+
+
+def parameter_values(model: Model) -> dict[str, float]:
+    """The parameters of a physical model by name: rate_1, gain_12, dead_zone_r, coupling_1, and effect.parameter."""
+    drive = require_physical(model)
+    coupling = (0.0, 0.0) if drive.coupling is None else drive.coupling
+    rows: Mapping[str, Array] = {
+        "rate_1": drive.rate[0], "rate_2": drive.rate[1],
+        **{f"gain_{i + 1}{j + 1}": drive.gain[i][j] for i in (0, 1) for j in (0, 1)},
+        "dead_zone_r": model.dead_zone[0], "dead_zone_l": model.dead_zone[1],
+        "coupling_1": coupling[0], "coupling_2": coupling[1],
+    }  # fmt: skip
+    effects = {f"{e.name}.{key}": value for e in model.effects for key, value in e.parameters.items()}
+    return {name: float(value) for name, value in (dict(rows) | effects).items()}
+
+
+def with_values(model: Model, changed: Mapping[str, float]) -> Model:
+    """The model with some parameters replaced."""
+    value = parameter_values(model) | dict(changed)
+    drive = Physical(
+        np.array([value["rate_1"], value["rate_2"]]),
+        np.array([[value["gain_11"], value["gain_12"]], [value["gain_21"], value["gain_22"]]]),
+        np.array([value["coupling_1"], value["coupling_2"]]),
+    )
+    effects = tuple(
+        dataclasses.replace(e, parameters={key: value[f"{e.name}.{key}"] for key in e.parameters})
+        for e in model.effects
+    )  # fmt: skip
+    dead_zone = np.array([value["dead_zone_r"], value["dead_zone_l"]])
+    return dataclasses.replace(model, dynamics=drive, dead_zone=dead_zone, effects=effects)

@@ -1,0 +1,112 @@
+"""From a physical model and a log to filtered starts and free runs, in blocks of stretches of one shape."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import numpy as np
+
+from jaxident.array_types import Array
+from jaxident.effects.coordinates import vector_of
+from jaxident.effects.fast_input import RUN_UP
+from jaxident.estimation.camera_noise import noise_for
+from jaxident.estimation.filtered_state import Run, Stretch, filter_and_run
+from jaxident.estimation.parameter_spread import directions
+from jaxident.estimation.stretches import AXES, Starts, cut_stretches, until_last_start
+from jaxident.log import Log, blind, repeats
+from jaxident.robot.model import Model
+from jaxident.robot.noise import Noise
+
+FORGOTTEN = 200
+"""Rows after which a filter with slip has forgotten where it began."""
+DIVERGED = 9.0
+"""Mean square of normalised innovations over the burn-in, three channels alike and none counted beyond `LIMIT`, above
+which a filter has not converged: three deviations where one is expected."""
+LANES, BLOCK = 32, 128
+"""Stretches that one call of the compiled program takes: 8, or a multiple of LANES up to BLOCK, so that there are few
+shapes to compile for."""
+
+
+class Ahead(NamedTuple):
+    """Predicted rows: pose (starts, horizon, 3); covariances (starts, horizon, 3, 3) of it by what is not known at the
+    start and by slip since; its slopes by the parameters, a deviation's worth of each independent direction (directions,
+    starts, horizon, 3); run_up (starts,): whether a start comes from a run-up of earlier commands."""
+
+    pose: Any
+    start: Any
+    slip: Any
+    parameters: Any
+    run_up: Any
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """Covariance (starts, horizon, 3, 3) of the predicted pose by all that is known to be uncertain."""
+        own = np.einsum("dshi,dshj->shij", self.parameters, self.parameters)
+        return self.start + self.slip + own
+
+
+def run_ahead(model: Model, log: Log, starts: Starts, horizon: int, *, burn_in: int, session_time: float) -> Ahead:
+    """Free runs of a physical model over `horizon` rows from filtered states.
+
+    With slip the filter forgets by itself and takes in FORGOTTEN rows at least. Without, it trusts the model for ever:
+    the burn-in alone then bounds how far small errors of the model pile up.
+    """
+    noise = noise_for(model, until_last_start(log, starts))
+    slips = float(noise.slip_along) > 0.0 or float(noise.slip_heading) > 0.0
+    before = max(burn_in, FORGOTTEN) if slips else burn_in
+    step = float(np.median(np.concatenate([np.diff(run.t) for run in log.runs()])))
+    lead = int(np.ceil(RUN_UP / step)) if model.effects else 0
+    chance = {effect.name: effect.parameters for effect in model.effects}
+    if "frozen_frames" in chance:
+        log = blind(log, repeats(log))
+    lost = chance["lost_commands"]["probability"] if "lost_commands" in chance else None
+    stretch = cut_stretches(log, starts, lead, before, horizon, session_time)
+    first = lead + before
+
+    def run(vector: Array, stretch: Stretch) -> Run:
+        return _in_blocks(vector, noise, lost, stretch, first)
+
+    found, run_up = _filtered(partial(run, vector_of(model)), stretch, first, burn_in)
+    pose, begin, slip = (np.moveaxis(leaf[first + 1 :], -1, 0) for leaf in found[:3])
+    slopes = [
+        (np.moveaxis(run(vector_of(other), stretch).pose[first + 1 :], -1, 0) - pose) / size
+        for other, size in directions(model)
+    ]
+    return Ahead(pose, begin, slip, np.array(slopes).reshape(-1, *pose.shape), run_up)
+
+
+def _filtered(run: Callable[[Stretch], Run], stretch: Stretch, first: int, burn_in: int) -> tuple[Run, Array]:
+    """The filter and the free run of every stretch; where it does not converge, a run-up of the commands from rest,
+    laid on the last pose; and where that is."""
+    found = run(stretch)
+    late = slice(max(first - burn_in + 1, 0), first + 1)
+    seen = np.maximum(stretch.seen[late].sum(axis=0), 1)
+    misses = found.innovation[late].sum(axis=0) / (3.0 * seen)
+    lost = ~(np.isfinite(found.pose[-1]).all(axis=0) & (misses < DIVERGED))
+    if not lost.any():
+        return found, lost
+    rows = np.arange(len(stretch.t))[:, None]
+    last = len(rows) - 1 - np.argmax(stretch.seen[::-1], axis=0)
+    other = stretch._replace(
+        seen=np.where(lost, rows == last, stretch.seen), first=np.where(lost, last, stretch.first),
+        speeds=np.where(lost, np.nan, stretch.speeds),
+    )  # fmt: skip
+    again = run(other)
+    return Run(*(np.where(lost, new, old) for new, old in zip(again, found, strict=True))), lost
+
+
+_run_block = partial(jax.jit, static_argnames="before")(filter_and_run)
+
+
+def _in_blocks(vector: Array, noise: Noise, lost: float | None, stretch: Stretch, first: int) -> Run:
+    """`filter_and_run` of any number of stretches; the last block is filled up with copies of its last one."""
+    count = stretch.t.shape[1]
+    size, parts = 8 if count <= 8 else min(-(-count // LANES) * LANES, BLOCK), []
+    for begin in range(0, count, size):
+        chosen = np.minimum(np.arange(begin, begin + size), count - 1)
+        block = Stretch(*(
+            np.take(leaf, chosen, axis=axis) for leaf, axis in zip(stretch, AXES, strict=True)
+        ))  # fmt: skip
+        parts.append(jax.tree.map(np.asarray, _run_block(vector, noise, lost, block, before=first)))
+    return Run(*(np.concatenate(leaves, axis=-1)[..., :count] for leaves in zip(*parts, strict=True)))

@@ -1,0 +1,73 @@
+"""The account of a diagnosis, for pages and terminals: who causes how many millimetres."""
+
+from jaxident import plot
+from jaxident.diagnosis.account.account import CAMERA, DISCOVERED, REST, SLIP, START, Account
+from jaxident.report.page import Figure, Section, Table
+from jaxident.report.words import SPACE, angle, length, part, percent
+
+BAR = 30
+"""Characters of a bar of text that stand for the whole error."""
+NOISE = (CAMERA, START, SLIP)
+
+
+def account_section(account: Account) -> Section:
+    """The waterfall, and the same as a table."""
+    heading = "Who causes how much"
+    shown = [row for row in account.rows if row.part != DISCOVERED or row.share]
+    if not shown:
+        return Section(heading, ["No stretch of the logs is left to judge by."])
+    figure, ax = plot.figure(size=(6.3, 0.9 + 0.28 * len(shown)))
+    plot.waterfall(
+        {part(row.part): row.share for row in shown},
+        {part(row.part): row.interval for row in shown},
+        notes={part(row.part): f"{length(row.rms_position)}, {angle(row.rms_heading)}" for row in shown},
+        noise=[part(name) for name in NOISE],
+        rest=part(REST),
+        ax=ax,
+    )
+    rows = [
+        (part(row.part), length(row.rms_position), angle(row.rms_heading), percent(row.share),
+         f"{percent(row.interval[0])} to {percent(row.interval[1])}")
+        for row in shown
+    ]  # fmt: skip
+    table = Table(("part", "position", "heading", "share", f"90{SPACE}% interval"), rows, CAPTION)
+    failed = f" {account.failed} more count in nothing: a model's prediction was not finite." if account.failed else ""
+    text = TEXT.format(horizon=account.horizon, windows=account.windows)
+    return Section(
+        heading, [f"{text}{failed}", Figure(plot.image(figure), "Shares of the error by cause", PICTURE), table]
+    )
+
+
+TEXT = (
+    "The nominal model, its parameters refitted, predicts {horizon:.3g} s ahead from {windows} places in runs that took no "
+    "part in any fit. Its mean squared error is split into what noise makes, what each named effect makes, and what is "
+    "left."
+)
+PICTURE = (
+    "Each bar begins where the one above ends; all together are the whole error. Grey: what no model can take away. Blue: "
+    f"named effects. Black: not explained. Red lines: 90{SPACE}% intervals of where a bar ends."
+)
+CAPTION = (
+    "Root mean squares; squares add up, millimetres do not. The share of an effect is what adding it to the model takes "
+    "away, averaged over all orders of adding (Shapley value). A negative share: the part makes up for another one."
+)
+
+
+def plain_text(text: str) -> str:
+    """A text for terminals of any encoding."""
+    return text.replace(SPACE, " ").replace("\N{MINUS SIGN}", "-").replace("²", "^2").replace("±", "+-")
+
+
+def account_lines(account: Account) -> list[str]:
+    """The account as lines of text with bars."""
+    shown = [row for row in account.rows if row.part != DISCOVERED or row.share]
+    if not shown:
+        return []
+    names = [part(row.part) for row in shown]
+    width = max(map(len, names))
+    lines = [f"who causes the error {account.horizon:.3g} s ahead ({account.windows} starts in runs that no fit saw):"]
+    for name, row in zip(names, shown, strict=True):
+        bar = "#" * round(BAR * min(max(row.share, 0.0), 1.0))
+        cells = f"{length(row.rms_position):>9} {angle(row.rms_heading):>10} {percent(row.share):>6}"
+        lines.append(plain_text(f"  {name:<{width}} {cells}  {bar}").rstrip())
+    return lines

@@ -1,0 +1,136 @@
+"""What each part of a log is for, and that what judges has no say in any fit."""
+
+import jax
+import numpy as np
+import pytest
+
+from jaxident.diagnosis.account.models import LOST
+from jaxident.diagnosis.causes.direct import direct_effects, direct_evidence, present
+from jaxident.diagnosis.motion.paths import track
+from jaxident.diagnosis.motion.windows import cut
+from jaxident.diagnosis.prepare import BURN, FEWEST, judging_starts, prepare, shows_start
+from jaxident.diagnosis.repair import search
+from jaxident.diagnosis.roles import LONGEST, PARTS, split
+from jaxident.effects.coordinates import PLACES, neutral_vector, nominal_vector
+from jaxident.effects.simulate import simulate
+from jaxident.errors import InputError
+from jaxident.log import Log, join, make_log, run_begins
+from jaxident.robot.drive import Physical
+from jaxident.robot.model import Effect, Model
+from jaxident.robot.noise import Noise
+from jaxident.study.synthetic import excite
+
+STEP, ROWS = 0.03, 50
+ROBOT = Model(STEP, Physical(np.array([3.0, 5.0]), np.array([[0.5, 0.45], [9.0, -8.5]])), np.array([0.1, 0.12]),
+              noise=Noise(3e-4, 2e-3))  # fmt: skip
+
+
+def blank(rows: int, runs: int) -> Log:
+    t = STEP * np.arange(rows)
+    return join([make_log(t, np.sin(t), np.cos(t), 0.0 * t, 0.0 * t, 0.0 * t) for _ in range(runs)])
+
+
+def rows_of(log, pieces):
+    begins = run_begins(log)
+    return [row for p in pieces for row in range(begins[p.run] + p.first, begins[p.run] + p.last)]
+
+
+@pytest.mark.parametrize(("rows", "runs"), [(600, 1), (600, 2), (600, 7), (22000, 1), (2500, 4)])
+def test_every_row_has_one_role_and_a_third_judges(rows, runs):
+    log = blank(rows, runs)
+    roles = split(log, ROWS)
+    fit, judge = (rows_of(log, pieces) for pieces in roles)
+    assert sorted(fit + judge) == list(range(rows * runs))
+    assert 0.2 < len(judge) / (rows * runs) < 0.45
+    assert max(p.last - p.first for p in roles.fit) <= max(LONGEST, 2 * ROWS)
+    assert len(roles.judge) <= max(PARTS, runs)
+    if runs >= 3:
+        assert {p.run for p in roles.judge} == set(range(1, runs, 3))
+
+
+def test_a_piece_of_a_long_run_drives_as_the_whole_does():
+    """A delay, a lag, play and a slew limit remember what was commanded before the piece."""
+    rng = np.random.default_rng(1)
+    log = blank(2400, 3)
+    u = np.repeat(rng.uniform(-1.0, 1.0, (2400 * 3 // 12, 2)), 12, axis=0)
+    log = log._replace(u_r=u[:, 0], u_l=u[:, 1])
+    vector = neutral_vector(nominal_vector(ROBOT.dynamics, ROBOT.dead_zone))
+    sizes = {("transport_delay", "delay"): 0.11, ("motor_lag", "time_constant"): 0.15, ("backlash", "right"): 0.05,
+             ("backlash", "left"): 0.04, ("input_rate_limit", "inverse_rate"): 0.1}  # fmt: skip
+    for pair, size in sizes.items():
+        vector[PLACES[pair]] = size
+    whole, pieces = cut(log, ROWS), cut(log, ROWS, pieces=split(log, ROWS).fit)
+    assert len(pieces.command) < 1.2 * LONGEST < 0.6 * len(whole.command)
+    paths = [np.stack(jax.jit(track)(vector, np.zeros((5, len(w.run))), w)) for w in (whole, pieces)]
+    order = [int(np.flatnonzero(whole.row == row)[0]) for row in pieces.row]
+    np.testing.assert_allclose(paths[1], paths[0][:, :, order], atol=2e-6)
+    np.testing.assert_allclose(pieces.session[pieces.run] + pieces.t[pieces.first, pieces.run],
+                               (whole.session[whole.run] + whole.t[whole.first, whole.run])[order])  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def logs():
+    """Four runs of a robot with a delay, lost commands and outliers."""
+    effects = (Effect("transport_delay", {"delay": 0.08}), Effect(LOST, {"probability": 0.15}),
+               Effect("outliers", {"probability": 0.02, "position": 0.02, "heading": 0.2}))  # fmt: skip
+    robot = Model(STEP, ROBOT.dynamics, ROBOT.dead_zone, ROBOT.noise, effects)
+    plain = [excite(jax.random.key(k), "multilevel", 260, STEP, hold=12) for k in range(4)]
+    runs = [simulate(robot, log, key=jax.random.key(10 + k)) for k, log in enumerate(plain)]
+    return [Log(*map(np.asarray, run)) for run in runs]
+
+
+def found(logs):
+    prepared, finding = search(prepare(logs, None))
+    direct = direct_effects(prepared, finding, present(finding, direct_evidence(prepared, finding)))
+    return prepared, finding, direct
+
+
+def test_judging_runs_only_report(logs):
+    """Other poses in the run that judges, noise and nonsense, change no fit, no name, no size and no law."""
+    rng, other = np.random.default_rng(0), list(logs)
+    shape = len(logs[1].t)
+    other[1] = logs[1]._replace(x=rng.normal(size=shape), y=rng.normal(size=shape), theta=rng.uniform(-3, 3, shape))
+    one, two = found(logs), found(other)
+    assert one[1].selected == two[1].selected
+    assert one[1].law == two[1].law
+    assert one[2] == two[2]
+    assert one[1].candidates.keys() == two[1].candidates.keys()
+    for effects, candidate in one[1].candidates.items():
+        np.testing.assert_array_equal(candidate.solution.vector, two[1].candidates[effects].solution.vector)
+    assert set(one[0].judging.run) == {1}
+    np.testing.assert_array_equal(one[0].log.u_r, join(logs).u_r)  # judged under the commands that were sent
+
+
+def test_sizes_of_outliers_come_out_in_the_model(logs):
+    """About 15 of them: a root mean square of so few has a standard error of 13 % in position, of 18 % in heading."""
+    _, _, direct = found(logs)
+    assert direct["outliers"]["position"] == pytest.approx(0.02, rel=0.5)
+    assert direct["outliers"]["heading"] == pytest.approx(0.2, rel=0.5)
+
+
+def test_windows_that_do_not_show_their_start_take_no_part():
+    """Of every fourth window all but just enough of its first poses are missing, of every fifth one more."""
+    log = blank(24 * ROWS, 1)
+    x = np.array(log.x).reshape(24, ROWS)
+    x[::4, : BURN - FEWEST] = np.nan
+    x[::5, : BURN + 1 - FEWEST] = np.nan
+    windows = cut(log._replace(x=x.ravel()), ROWS)
+    assert np.sum(shows_start(windows)) == np.sum(np.arange(24) % 5 > 0)
+
+
+def test_starts_that_nothing_shows_do_not_judge():
+    log = blank(200, 1)
+    x = np.array(log.x)
+    x[101 - BURN : 101 - FEWEST + 1] = np.nan  # one pose short before row 100
+    x[150] = np.nan
+    starts = judging_starts(log._replace(x=x), split(log, 400).fit, 20)
+    rows = starts.row.tolist()
+    assert 100 not in rows
+    assert 130 not in rows  # its horizon is row 150
+    assert {20, 40, 60, 120, 140} <= set(rows)
+
+
+def test_a_log_without_anything_to_judge_by_is_refused(logs):
+    other = [logs[0], logs[1]._replace(x=np.full(len(logs[1].t), np.nan)), *logs[2:]]
+    with pytest.raises(InputError, match="none to judge by"):
+        prepare(other, None)
