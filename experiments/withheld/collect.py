@@ -5,7 +5,8 @@ import pathlib
 import shutil
 
 HEAD = (
-    "| case | verdict | named (probability) | alike | site | unknown | gap refitted / after / floor | shrink (90 %) |"
+    "| case | verdict | named (probability) | alike | site | unexplained | gap refitted / after / floor | "
+    "shrink (90 %) |"
 )
 
 
@@ -32,5 +33,5 @@ def _row(name: str, found: dict) -> str:
     gap, interval = found["gap"], found["gap"]["shrink_interval"]
     levels = " / ".join(f"{gap[key]:.3g}" for key in ("refitted", "after")) + f" / {gap['floor']['value']:.3g}"
     shrink = "" if interval is None else f"{gap['shrink']:.2f} ({interval[0]:.2f} to {interval[1]:.2f})"
-    unknown = f"{found['probability']['unknown']:.2f}"
-    return f"| {name} | {found['verdict']} | {named} | {alike} | {site} | {unknown} | {levels} | {shrink} |"
+    rest = f"{found['probability']['unexplained']:.2f}"
+    return f"| {name} | {found['verdict']} | {named} | {alike} | {site} | {rest} | {levels} | {shrink} |"

@@ -3,29 +3,31 @@
 import itertools
 from typing import Any
 
-GAP_VERDICTS = ("effects", "unknown")
+GAP_VERDICTS = ("effects", "partly", "unknown")
+NAMING = ("effects", "partly")
 
 
 def mark(answer: dict, diagnosis: dict | None) -> dict[str, Any]:
     """All marks of a case; a diagnosis that is missing (the process failed) is wrong wherever it counts.
 
-    claimed: a gap beyond parameters is claimed. right: the hidden set is named, no more and no less, where a name also
-    stands for those said to be indistinguishable from it. strict: the same without them. some: at least one hidden
-    effect is named. site, channel: the most probable site, the channel of most excess, are among the right ones.
-    top: probability of the most probable of none, unknown and the sets, and whether that is the truth.
+    claimed: a gap beyond parameters is claimed. unexplained: something is told that no named effect covers, apart from
+    the names. right: the hidden set is named, no more and no less, where a name also stands for those said to be
+    indistinguishable from it. strict: the same without them. some: at least one hidden effect is named. site, channel:
+    the most probable site, the channel of most excess, are among the right ones. top: probability of the most probable
+    set, or outside the catalogue that something is unexplained, and whether that is the truth.
     """
     if diagnosis is None:
         diagnosis = {"verdict": "failed"}
     selected, likeness = diagnosis.get("selected") or [], look_alikes(diagnosis)
     kind, accepted = answer["kind"], answer["accepted"]
     listed = kind in ("single", "pair")
-    effects = diagnosis["verdict"] == "effects"
+    effects = diagnosis["verdict"] in NAMING
     alike = [{name, *likeness.get(name, ())} for name in selected]
     return {
         "kind": kind,
         "verdict": diagnosis["verdict"],
         "claimed": diagnosis["verdict"] in GAP_VERDICTS,
-        "unknown": diagnosis["verdict"] == "unknown",
+        "unexplained": diagnosis["verdict"] in ("partly", "unknown"),
         "selected": selected,
         "right": bool(effects and covers(accepted, alike)) if listed else None,
         "strict": bool(effects and covers(accepted, [{name} for name in selected])) if listed else None,
@@ -63,14 +65,15 @@ def covers(accepted: list[list[str]], found: list[set[str]]) -> bool:
 def hypotheses(answer: dict, diagnosis: dict, likeness: dict) -> list[tuple[float, bool]]:
     """Probability of each hypothesis of the diagnosis, and whether it is the truth."""
     given = diagnosis.get("probability") or {}
-    rows = [
-        (given.get("none", 0.0), answer["kind"] == "none"),
-        (given.get("unknown", 0.0), answer["kind"] == "outside"),
-    ]
+    if answer["kind"] == "outside":
+        p = given.get("unexplained", 0.0)
+        return [(p, True), (1.0 - p, False)]
+    rows = []
     for each in given.get("sets") or []:
         alike = [{name, *likeness.get(name, ())} for name in each["effects"]]
-        rows.append((each["p"], bool(answer["accepted"]) and covers(answer["accepted"], alike)))
-    return rows
+        right = covers(answer["accepted"], alike) if answer["accepted"] else not alike
+        rows.append((each["p"], right))
+    return rows or [(0.0, False)]
 
 
 def top(answer: dict, diagnosis: dict, likeness: dict) -> tuple[float, bool] | None:

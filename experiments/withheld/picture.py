@@ -9,6 +9,7 @@ import jaxident as ji
 from jaxident.effects import CATALOGUE
 
 from .intervals import wilson
+from .marks import NAMING
 from .score import reliability
 
 VERDICTS = ("no_gap", "parameters", "unknown", "undecided", "failed")
@@ -37,7 +38,7 @@ def confusion(pairs: list[tuple[str, str]], path: pathlib.Path) -> None:
 
 def said(mark: dict[str, Any]) -> str:
     """What a diagnosis says in one word: the first effect, or the verdict."""
-    return mark["selected"][0] if mark["verdict"] == "effects" and mark["selected"] else mark["verdict"]
+    return mark["selected"][0] if mark["verdict"] in NAMING and mark["selected"] else mark["verdict"]
 
 
 def reliable(tops: np.ndarray, path: pathlib.Path) -> None:

@@ -98,14 +98,14 @@ def _causes(found: dict[str, dict]) -> Section:
     for name, each in found.items():
         likely = [f"{c['effect']} ({c['probability']:.2f})" for c in each["causes"] if c["probability"] > LIKELY]
         best = max(each["probability"]["sets"], key=lambda one: one["p"], default={"effects": []})["effects"]
-        terms = sorted(each["unexplained"], key=lambda term: -term["gain"])[:2]
+        terms = sorted(each["terms"], key=lambda term: -term["gain"])[:2]
         rows.append((
-            name, each["verdict"], float(f"{each['probability']['unknown']:.3f}"), ", ".join(likely), ", ".join(best),
-            "; ".join(term["term"] for term in terms),
+            name, each["verdict"], float(f"{each['probability']['unexplained']:.3f}"), ", ".join(likely),
+            ", ".join(best), "; ".join(term["term"] for term in terms),
         ))  # fmt: skip
-    heads = ("robot", "verdict", "unknown", "named or likely", "best known set", "largest of what is left")
-    share = np.mean([each["verdict"] == "unknown" for each in found.values()])
-    text = f"{100.0 * share:.0f} % of the robots come out as unknown: no set of the catalogue explains enough."
+    heads = ("robot", "verdict", "unexplained", "named or likely", "best known set", "largest of what is left")
+    share = np.mean([each["verdict"] in ("partly", "unknown") for each in found.values()])
+    text = f"On {100.0 * share:.0f} % of the robots something takes part that no named effect covers."
     return Section("Which cause", [text, Table(heads, rows)])
 
 

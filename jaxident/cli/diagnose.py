@@ -56,7 +56,6 @@ def command(logs, sim, model, horizon, out, seed):
     from jaxident.files.diagnosis import diagnosis_to_dict
     from jaxident.files.logs import find_simulated, read_log, read_logs
     from jaxident.files.models import load_model, save_model
-    from jaxident.report.account import account_lines
     from jaxident.report.diagnosis import diagnosis_page
     from jaxident.report.page import write_page
 
@@ -68,14 +67,7 @@ def command(logs, sim, model, horizon, out, seed):
         found = diagnose(records, sim=theirs or None, model=nominal, horizon=horizon, seed=seed)
     found = _with_origin(found, logs, seed)
     content = diagnosis_to_dict(found)
-    for line in account_lines(found.account):
-        click.echo(line)
-    click.echo(f"verdict: {SENTENCE[found.verdict].format(effects=' and '.join(found.selected))}")
-    click.echo(table([("cause", "takes part", "site"), *_causes(found)]))
-    click.echo(_gap(found))
-    if found.surplus:
-        click.echo(f"your simulator has, and the robot has not: {', '.join(found.surplus)}")
-    click.echo(found.next)
+    click.echo("\n".join(_told(found)))
     write_json(content, os.path.join(out, "diagnosis.json"))
     for name, written in (("nominal_model", found.nominal_model), ("corrected_model", found.corrected_model)):
         path = os.path.join(out, f"{name}.json")
@@ -98,6 +90,18 @@ def _with_origin(found, logs, seed: int):
     return found._replace(**models)
 
 
+def _told(found) -> list[str]:
+    """What the terminal says of a diagnosis."""
+    from jaxident.report.account import account_lines
+
+    lines = account_lines(found.account)
+    lines.append(f"verdict: {SENTENCE[found.verdict].format(effects=' and '.join(found.selected))}")
+    lines += [table([("cause", "takes part", "site"), *_causes(found)]), _gap(found)]
+    if found.surplus:
+        lines.append(f"your simulator has, and the robot has not: {', '.join(found.surplus)}")
+    return [*lines, found.next]
+
+
 def _causes(found) -> list[tuple[str, ...]]:
     rows = [(c.effect, f"{c.probability:.3f}", c.site) for c in found.judgement.causes]
     return [*rows, ("something that no named effect covers", f"{found.judgement.unexplained:.3f}", "")]
@@ -108,7 +112,7 @@ def _gap(found) -> str:
     from jaxident.report.words import error
 
     gap, rms = found.gap, found.gap.rms
-    rows = [("model", "error", "camera variances")]
+    rows: list[tuple[str, ...]] = [("model", "error", "camera variances")]
     given = [("before", "as given", gap.before)] if any(p.nominal is not None for p in found.parameters) else []
     names = [*given, ("refitted", "nominal, parameters refitted" if given else "nominal", gap.refitted)]
     for key, name, level in (*names, ("after", "corrected", gap.after), ("floor", "noise alone", gap.floor)):

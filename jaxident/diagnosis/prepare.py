@@ -74,9 +74,9 @@ def prepare(
 ) -> Prepared:
     """Windows, roles and the nominal fit; `nominal` (10,) is where its search begins, from the data alone without.
 
-    With `like` the commands are scaled as there, and with `law` the noise is taken for that: logs of a simulator that
-    are free of noise are judged by what the robot's camera could see, and none of their runs is kept apart.
-    InputError where the log says nothing: no motion, no excitation, too few poses.
+    With `like` the commands are scaled as there; with `law` the noise is taken for that and no run is kept apart: so
+    are logs of a simulator without noise judged by what the robot's camera could see. InputError where the log says
+    nothing.
     """
     given = join(logs)
     check_informative(given)
@@ -101,12 +101,7 @@ def prepare(
     here = given, largest
     if law is not None:
         return Prepared(*here, windows, judging, rows, horizon, Frames(frozen, frozen), first, law)
-    outlying = find_outliers(fitted, windows, first)
-    if outlying.any():
-        windows, first = without_rows(fitted, outlying, first, pieces)
-    if has_outliers(outlying, int(np.isfinite(fitted.x).sum())):
-        outlying |= find_more_outliers(blind(fitted, outlying), windows, first)
-        windows, first = without_rows(fitted, outlying, first, pieces)
+    outlying, windows, first = without_outliers(fitted, windows, first, pieces)
     responses = respond(np.exp(first.vector[:2]), first.linear.residual, windows)
     law = size_noise(first.linear.residual, first.linear.starts, windows, responses)
     return Prepared(*here, windows, judging, rows, horizon, frames_of(fitted, frozen, outlying), first, law)
@@ -151,14 +146,14 @@ def judging_starts(log: Log, pieces: list[Piece], rows: int) -> Starts:
         run = log.runs()[piece.run]
         seen = np.isfinite(np.stack(run.pose)).all(axis=0)
         last = piece.last - 1 - rows
-        starts = np.arange(max(piece.first, BURN), last + 1, rows) if last >= BURN else np.array([last])
+        rows_of = np.arange(max(piece.first, BURN), last + 1, rows) if last >= BURN else np.array([last])
         found += [
-            (piece.run, start)
-            for start in starts[starts >= FEWEST]
-            if seen[max(start + 1 - BURN, 0) : start + 1].sum() >= FEWEST and seen[start + rows]
+            (piece.run, row)
+            for row in rows_of[rows_of >= FEWEST]
+            if seen[max(row + 1 - BURN, 0) : row + 1].sum() >= FEWEST and seen[row + rows]
         ]
-    run, row = np.array(found, int).reshape(-1, 2).T
-    return Starts(run, row)
+    starts = np.array(found, int).reshape(-1, 2)
+    return Starts(starts[:, 0], starts[:, 1])
 
 
 def starting_point(log: Log, pieces: list[Piece]) -> np.ndarray:
@@ -209,6 +204,19 @@ def stretches(log: Log, rows: int, pieces: list[Piece]) -> Windows:
 def shows_start(windows: Windows) -> np.ndarray:
     """Windows, boolean, that have poses enough among their first rows."""
     return np.sum(windows.seen[:BURN], axis=0) >= FEWEST
+
+
+def without_outliers(
+    log: Log, windows: Windows, fit: Solution, pieces: list[Piece]
+) -> tuple[np.ndarray, Windows, Solution]:
+    """Rows that are outliers, and windows and nominal fit without them."""
+    outlying = find_outliers(log, windows, fit)
+    if outlying.any():
+        windows, fit = without_rows(log, outlying, fit, pieces)
+    if has_outliers(outlying, int(np.isfinite(log.x).sum())):
+        outlying |= find_more_outliers(blind(log, outlying), windows, fit)
+        windows, fit = without_rows(log, outlying, fit, pieces)
+    return outlying, windows, fit
 
 
 def without_rows(log: Log, rows: Array, fit: Solution, pieces: list[Piece]) -> tuple[Windows, Solution]:

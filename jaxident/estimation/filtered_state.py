@@ -85,8 +85,8 @@ def filter_and_run(vector: Array, noise: Noise, lost: Array | None, stretch: Str
     number = jnp.arange(len(t))
     size = 5 + 2 * (noise.slip_time is not None) + 3 * (noise.correlation_time is not None)
     none = jnp.zeros((size, t.shape[1]))
-    begin = _Belief(none, *[jnp.zeros((size, *none.shape))] * 2, [none[0]] * 2)
-    wide = _wide(noise)
+    nothing, wide = jnp.zeros((size, *none.shape)), _wide(noise)
+    begin = _Belief(none, nothing, nothing, [none[0]] * 2)
 
     def body(belief, now):
         k, row, own, pose, seen, jolt = now
@@ -108,8 +108,8 @@ def _wide(noise: Noise) -> Array:
 
 
 def _opened(settings, wide: Array, belief: _Belief, pose: Array, speeds: Array, here: Array) -> _Belief:
-    """Where the filter begins: at the robot whose reported pose is the first, hardly known; at some speeds, hardly known
-    either, or at those of the run-up, as well as it knows them."""
+    """Where the filter begins: at the robot whose reported pose is the first, hardly known; at some speeds, hardly
+    known either, or at those of the run-up, as well as it knows them."""
     mean, start, slip, excess = belief
     x, y, theta = pose.T
     for _ in range(3):  # the camera moves a pose by little that depends on it
@@ -148,7 +148,7 @@ def _take_in(settings, noise: Noise, belief: _Belief, pose: Array, seen: Array) 
     shown, camera = _seen_by(settings, mean)
     error = pose.T - shown - (mean[-3:] if memory else 0.0)
     error = error.at[2].set(wrap(error[2]))
-    whole, total, far = mean, 0.0, jnp.zeros_like(seen)
+    whole, total, far = mean, jnp.zeros_like(mean[0]), jnp.zeros_like(seen)
     for k, (sd, white) in enumerate((_camera(noise)[0], *_camera(noise))):
         weights = jnp.zeros_like(mean).at[:3].set(camera[k])
         weights = weights.at[k - 3].add(1.0) if memory else weights

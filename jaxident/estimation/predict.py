@@ -87,8 +87,8 @@ def _flatten(log: Log, starts: Starts, ahead: Ahead) -> Prediction:
     )
     t = np.concatenate([np.asarray(runs[k].t)[row + 1 :][:horizon] for k, row in zip(*starts, strict=True)])
     deviation = np.sqrt(np.maximum(np.diagonal(ahead.covariance, axis1=2, axis2=3), 0.0))
-    columns = (column[kept] for column in (*np.moveaxis(ahead.pose, 2, 0), *np.moveaxis(deviation, 2, 0)))
-    return Prediction(run, start, step[kept], t, *columns, run_up)
+    x, y, theta, sd_x, sd_y, sd_theta = np.concatenate([ahead.pose, deviation], axis=2)[kept].T
+    return Prediction(run, start, step[kept], t, x, y, theta, sd_x, sd_y, sd_theta, run_up)
 
 
 def prediction_error(prediction: Prediction, log: Log) -> dict[str, Any]:

@@ -62,7 +62,7 @@ def _run_all(model: Model, windows: _Window, noise: Array) -> tuple[Array, Array
 def _poses(model: Model, window: _Window, start: Array) -> Array:
     """Poses (rows, 3) from the state of the first row (x, y, theta, v, w)."""
     state = State(*start)
-    found = run_difference(model.dynamics, model.dead_zone, window.command, state, model.sample_period)
+    found = run_difference(model.difference, model.dead_zone, window.command, state, model.sample_period)
     return jnp.stack(found, axis=-1)
 
 

@@ -30,8 +30,8 @@ shapes to compile for."""
 
 class Ahead(NamedTuple):
     """Predicted rows: pose (starts, horizon, 3); covariances (starts, horizon, 3, 3) of it by what is not known at the
-    start and by slip since; its slopes by the parameters, a deviation's worth of each independent direction (directions,
-    starts, horizon, 3); run_up (starts,): whether a start comes from a run-up of earlier commands."""
+    start and by slip since; its slopes by the parameters, a deviation's worth of each independent direction
+    (directions, starts, horizon, 3); run_up (starts,): whether a start comes from a run-up of earlier commands."""
 
     pose: Any
     start: Any

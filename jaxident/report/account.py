@@ -39,17 +39,17 @@ def account_section(account: Account) -> Section:
 
 
 TEXT = (
-    "The nominal model, its parameters refitted, predicts {horizon:.3g} s ahead from {windows} places in runs that took no "
-    "part in any fit. Its mean squared error is split into what noise makes, what each named effect makes, and what is "
-    "left."
+    "The nominal model, its parameters refitted, predicts {horizon:.3g} s ahead from {windows} places in runs that "
+    "took no part in any fit. Its mean squared error is split into what noise makes, what each named effect makes, and what "
+    "is left."
 )
 PICTURE = (
-    "Each bar begins where the one above ends; all together are the whole error. Grey: what no model can take away. Blue: "
-    f"named effects. Black: not explained. Red lines: 90{SPACE}% intervals of where a bar ends."
+    "Each bar begins where the one above ends; all together are the whole error. Grey: what no model can take away. "
+    f"Blue: named effects. Black: not explained. Red lines: 90{SPACE}% intervals of where a bar ends."
 )
 CAPTION = (
-    "Root mean squares; squares add up, millimetres do not. The share of an effect is what adding it to the model takes "
-    "away, averaged over all orders of adding (Shapley value). A negative share: the part makes up for another one."
+    "Root mean squares; squares add up, millimetres do not. The share of an effect is what adding it to the model "
+    "takes away, averaged over all orders of adding (Shapley value). A negative share: the part makes up for another."
 )
 
 

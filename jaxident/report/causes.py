@@ -23,9 +23,9 @@ def causes(found: Diagnosis) -> Section:
     """Which effects: probabilities, parameters, look-alikes, the ranking, and what none of them explains."""
     judgement = found.judgement
     text = (
-        f"Probability that anything is missing in the nominal model: {chance(judgement.gap)}. That something takes part "
-        f"which no named effect covers: {chance(judgement.unexplained)}. The probability of an effect below says that it "
-        "takes part, whatever else does."
+        f"Probability that anything is missing in the nominal model: {chance(judgement.gap)}. That something takes "
+        f"part which no named effect covers: {chance(judgement.unexplained)}. The probability of an effect below says "
+        "that it takes part, whatever else does."
     )
     table = _cause_table(found)
     first = table if table.rows else "No effect of the catalogue is likely to take part."
@@ -238,14 +238,3 @@ DIRECT = (
     "Frozen frames, outliers and camera errors that persist are looked for in the frames themselves and in the noise; "
     "they need no special input."
 )
-
-
-def in_words(found: Diagnosis) -> str:
-    """The selected effects with what they are and their parameters, for a sentence."""
-    in_force = {effect.name: effect for effect in found.corrected_model.effects}
-    parts = []
-    for name in found.selected:
-        effect = in_force.get(name)
-        size = "" if effect is None else f"; {parameters(name, effect.parameters, effect.standard_deviation)}"
-        parts.append(f"{plain(name)} ({EFFECTS[name]}{size})")
-    return f"{', '.join(parts[:-1])} and {parts[-1]}" if len(parts) > 1 else "".join(parts)

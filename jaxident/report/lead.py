@@ -2,8 +2,8 @@
 
 from jaxident.diagnosis.account.account import REST
 from jaxident.diagnosis.diagnose import DIFFERENT, Diagnosis, Parameter
-from jaxident.report import causes, words
-from jaxident.report.words import NOMINAL, error, number, percent, plain, together
+from jaxident.report import words
+from jaxident.report.words import EFFECTS, NOMINAL, error, number, parameters, percent, plain, together
 
 COUNTS = {2: "two", 3: "three", 4: "four"}
 CLEAREST = 3
@@ -15,14 +15,14 @@ def lead(found: Diagnosis) -> str:
     rms = found.gap.rms
     if found.verdict == "no_gap":
         return (
-            f"No gap: {_ahead(found)} the model is off by {error(rms['refitted'])} (root mean square), where noise alone "
-            f"makes {error(rms['floor'])}."
+            f"No gap: {_ahead(found)} the model is off by {error(rms['refitted'])} (root mean square), where noise "
+            f"alone makes {error(rms['floor'])}."
         )
     if found.verdict == "parameters":
         return (
-            f"The model has the right form but not the right parameters: {_moved(found)}. Refitting them takes the error "
-            f"{_ahead(found)} from {error(rms['before'])} to {error(rms['refitted'])} (root mean square); noise alone "
-            f"makes {error(rms['floor'])}."
+            f"The model has the right form but not the right parameters: {_moved(found)}. Refitting them takes the "
+            f"error {_ahead(found)} from {error(rms['before'])} to {error(rms['refitted'])} (root mean square); noise "
+            f"alone makes {error(rms['floor'])}."
         )
     if found.verdict in ("effects", "partly"):
         return f"{_named(found)}{_left(found)}{_resized(found)}{_doubt(found)}"
@@ -52,7 +52,18 @@ def _named(found: Diagnosis) -> str:
     shares = {row.part: row.share for row in found.account.rows}
     told = [f"{percent(shares[name])} is due to {plain(name)}" for name in found.selected if name in shares]
     due = f" Of the mean squared error {_listed(told)}." if told else ""
-    return f"{begin} {count}: {causes.in_words(found)}. {_size(found)}{due}"
+    return f"{begin} {count}: {_in_words(found)}. {_size(found)}{due}"
+
+
+def _in_words(found: Diagnosis) -> str:
+    """The selected effects with what they are and their parameters, for a sentence."""
+    in_force = {effect.name: effect for effect in found.corrected_model.effects}
+    parts = []
+    for name in found.selected:
+        effect = in_force.get(name)
+        size = "" if effect is None else f"; {parameters(name, effect.parameters, effect.standard_deviation)}"
+        parts.append(f"{plain(name)} ({EFFECTS[name]}{size})")
+    return _listed(parts)
 
 
 def _listed(parts: list[str]) -> str:

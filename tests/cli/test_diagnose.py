@@ -7,14 +7,17 @@ import pytest
 from click.testing import CliRunner
 
 from jaxident.cli.diagnose import command
+from jaxident.cli.predict import command as predict
 from jaxident.errors import InputError
-from jaxident.files.logs import write_log
+from jaxident.files.logs import read_log, write_log
+from jaxident.files.models import load_model
 from jaxident.log import make_log
 
 
 @pytest.fixture(autouse=True)
 def started(monkeypatch):
-    monkeypatch.setattr("jaxident.cli.diagnose.start_jax", lambda: None)  # the tests' own start has no cache
+    for name in ("diagnose", "predict"):  # the tests' own start has no cache
+        monkeypatch.setattr(f"jaxident.cli.{name}.start_jax", lambda: None)
 
 
 def refused(*words) -> str:
@@ -38,7 +41,7 @@ def test_missing_files_and_short_runs_are_refused(tmp_path):
     u = np.sign(np.sin(t))
     short = make_log(t, u, 0.5 * u, np.cumsum(0.01 * u), 0.0 * t, np.cumsum(0.005 * u))
     write_log(short, tmp_path / "short.csv")
-    assert "too few to name and to judge" in refused(str(tmp_path / "short.csv"), "--out", str(tmp_path / "out"))
+    assert "none to judge by" in refused(str(tmp_path / "short.csv"), "--out", str(tmp_path / "out"))
 
 
 def test_logs_whose_stretches_never_show_their_start_are_refused(tmp_path):
@@ -62,6 +65,23 @@ def test_sim_takes_all_words_up_to_the_next_option():
     assert again["sim"] == ("a.csv", "b.csv")
 
 
+def promised_on(out, log):
+    """Mean square of the errors of `jaxident predict` over the camera's variances, the corrected model on one log."""
+    found, path = json.loads((out / "diagnosis.json").read_text()), out / "predicted.csv"
+    model = load_model(out / "corrected_model.json")
+    horizon = round(found["gap"]["horizon"] / model.sample_period)
+    words = [str(out / "corrected_model.json"), str(log), "--horizon", str(horizon), "--out", str(path)]
+    assert CliRunner().invoke(predict, words).exit_code == 0
+    predicted, measured = np.genfromtxt(path, delimiter=",", names=True), read_log(log)
+    path.unlink()
+    ends = predicted[predicted["step"] == horizon]
+    rows = (ends["start"] + horizon).astype(int)
+    errors = np.stack([measured.pose[k][rows] - ends[name] for k, name in enumerate(("x", "y", "theta"))])
+    errors[2] = np.angle(np.exp(1j * errors[2]))
+    camera = np.array([model.noise.position, model.noise.position, model.noise.heading])
+    return np.mean((errors / camera[:, None]) ** 2)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("effect", ["none", "turn_loss", "transport_delay"])
 def test_the_effect_of_an_example_is_found(tmp_path, effect):
@@ -77,6 +97,8 @@ def test_the_effect_of_an_example_is_found(tmp_path, effect):
     if effect != "none":
         alike = {name for cause in found["causes"][:1] for name in (cause["effect"], *cause["indistinguishable_from"])}
         assert effect in alike
+    kept = promised_on(out, logs / "real_2.csv"), promised_on(out, logs / "real_5.csv")
+    assert np.mean(kept) == pytest.approx(found["gap"]["after"], rel=0.1)
     assert {path.name for path in out.iterdir()} == {
         "diagnosis.json", "nominal_model.json", "corrected_model.json", "report.html",
     }  # fmt: skip

@@ -75,7 +75,7 @@ def plain_separation(asks, commands):
     run = np.repeat(np.arange(count), samples)
     flat = [column.T.ravel() for column in (*commands.transpose(2, 1, 0), *states[:3])]
     log = make_log(np.tile(asks.period * np.arange(samples), count), *flat, run=run)
-    windows = cut(log, asks.rows, session=np.zeros(count))
+    windows = cut(log, asks.rows)._replace(session=np.zeros(count))
     starts = states[:, windows.first, windows.run]
     scale = np.tile([1e3, 1e3, 1e2], asks.rows)
 
@@ -192,9 +192,8 @@ def lead_of_delay(delayed, command, seed):
     log = make_log(delayed.sample_period * np.arange(SAMPLES), *command.T)
     log = simulate(noisy, log, start=AT_REST, key=jax.random.key(seed))
     windows = cut(log._replace(**{name: np.asarray(getattr(log, name)) for name in ("x", "y", "theta")}), 50)
-    number = windows.step.shape[1]
     law = Law(question.CAMERA.position, question.CAMERA.heading)
-    data = Data(windows, whitener_of(law, windows, None), np.ones(number, bool))
+    data = Data(windows, whitener_of(law, windows, None))
     base = neutral_vector(nominal_vector(delayed.physical, np.asarray(delayed.dead_zone)))
     first = refit(data, base, first_starts(windows), ())
     fits = [refit(data, first.vector, first.starts, (name,)) for name in ("transport_delay", "motor_lag")]

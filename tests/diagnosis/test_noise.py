@@ -33,7 +33,7 @@ def sized_on(law, made, unit, rest):
     windows, responses, starts = made
     noise = (np.linalg.cholesky(covariance(law, windows, responses)) @ unit)[..., 0]
     measured = windows._replace(pose=windows.pose + noise.reshape(COUNT, ROWS, 3).transpose(1, 0, 2))
-    return size_noise(noise + rest, starts, measured, responses, np.ones(COUNT, bool))
+    return size_noise(noise + rest, starts, measured, responses)
 
 
 def test_whitener_whitens(made):
@@ -68,9 +68,7 @@ def test_noise_is_sized_where_poses_come_every_other_row(made):
     windows = windows._replace(seen=windows.seen & (np.arange(ROWS) % 2 == 1)[:, None] & (np.arange(COUNT) > 0))
     law, mask = Law(5e-4, 4e-3), np.repeat(windows.seen.T, 3, axis=1)
     noise = np.random.default_rng(5).normal(size=(COUNT, ROWS, 3)) * [law.position, law.position, law.heading]
-    found = size_noise(
-        noise.reshape(COUNT, -1) * mask, starts * mask[:, :, None], windows, responses, np.ones(COUNT, bool)
-    )
+    found = size_noise(noise.reshape(COUNT, -1) * mask, starts * mask[:, :, None], windows, responses)
     assert found.slip is None
     assert found.position == pytest.approx(law.position, rel=0.08)
     assert found.heading == pytest.approx(law.heading, rel=0.1)
@@ -90,7 +88,7 @@ def test_slip_without_any_camera_error_leaves_a_law_that_whitens(made):
     law = Law(1e-9, 1e-9, (0.1, 0.4), 0.8)
     unit = np.random.default_rng(7).normal(size=(COUNT, 3 * ROWS, 1))
     residual = (np.linalg.cholesky(covariance(law, windows, responses)) @ unit)[..., 0]
-    given = sample(residual, starts, windows, responses, np.ones(COUNT, bool))
+    given = sample(residual, starts, windows, responses)
     found = size_one(given, Law(5e-4, 4e-3), 0.8, None).law
     white = whitener_of(found, windows, responses)
     whitened = white @ covariance(found, windows, responses) @ white.transpose(0, 2, 1)
@@ -108,7 +106,6 @@ def test_camera_memory_is_not_taken_for_slip(made):
 def test_a_memory_is_the_cameras_where_most_windows_show_it(made, share, size, claimed):
     """Six draws: errors with a memory in all windows, and larger ones in five of sixty, as where wheels slide."""
     windows, responses, starts = made
-    use = np.ones(COUNT, bool)
     kinds = (Law(5e-4, 4e-3), Law(5e-4, 4e-3, coloured=(1e-3 * size, 8e-3 * size), coloured_time=0.5))
     white, slow = (np.linalg.cholesky(covariance(law, windows, responses)) for law in kinds)
     for seed in range(6):
@@ -116,9 +113,9 @@ def test_a_memory_is_the_cameras_where_most_windows_show_it(made, share, size, c
         factor = np.where((rng.permutation(COUNT) < share * COUNT)[:, None, None], slow, white)
         noise = (factor @ rng.normal(size=(COUNT, 3 * ROWS, 1)))[..., 0]
         measured = windows._replace(pose=windows.pose + noise.reshape(COUNT, ROWS, 3).transpose(1, 0, 2))
-        law = size_noise(noise, starts, measured, responses, use)
+        law = size_noise(noise, starts, measured, responses)
         assert law.coloured is not None
-        assert (steady_gain(noise, starts, measured, responses, use, law) > 0.0) == claimed
+        assert (steady_gain(noise, starts, measured, responses, law) > 0.0) == claimed
 
 
 def test_wheels_that_slide_sideways_at_random_are_no_memory_of_the_camera(made):
@@ -131,9 +128,9 @@ def test_wheels_that_slide_sideways_at_random_are_no_memory_of_the_camera(made):
     for seed in range(4):
         noise = (factor @ np.random.default_rng(seed).normal(size=(COUNT, 3 * ROWS, 1)))[..., 0]
         measured = windows._replace(pose=windows.pose + noise.reshape(COUNT, ROWS, 3).transpose(1, 0, 2))
-        law = size_noise(noise, starts, measured, responses, np.ones(COUNT, bool))
+        law = size_noise(noise, starts, measured, responses)
         assert law.coloured is not None
-        assert steady_gain(noise, starts, measured, responses, np.ones(COUNT, bool), law) == 0.0
+        assert steady_gain(noise, starts, measured, responses, law) == 0.0
 
 
 def test_a_rest_of_strong_slip_is_no_camera_memory(made):
@@ -151,12 +148,12 @@ def test_a_rest_of_strong_slip_is_no_camera_memory(made):
 def test_doubt_is_the_spread_of_the_sizes(made):
     """24 draws, four variances each: their logarithms miss by as much as said, standard error of the ratio 7 %."""
     windows, responses, starts = made
-    law, use = Law(5e-4, 4e-3, (0.03, 0.4), 0.2), np.ones(COUNT, bool)
+    law = Law(5e-4, 4e-3, (0.03, 0.4), 0.2)
     factor = np.linalg.cholesky(covariance(law, windows, responses))
     apart = []
     for seed in range(24):
         residual = (factor @ np.random.default_rng(seed).normal(size=(COUNT, 3 * ROWS, 1)))[..., 0]
-        given = sample(residual, starts, windows, responses, use)
+        given = sample(residual, starts, windows, responses)
         found = size_one(given, law, 0.2, None).law
         doubt = doubt_of(found, given)
         sizes = [np.log(np.square([one.position, one.heading, *one.slip])) for one in (found, law)]
@@ -169,10 +166,10 @@ def test_drawn_memories_lie_about_the_true_one(made, seed):
     """A memory half-way between two of the grid: draws are of its neighbours or close; deviations as they were."""
     windows, responses, starts = made
     memory = np.sqrt(MEMORIES[5] * MEMORIES[6])
-    law, use = Law(5e-4, 4e-3, (0.06, 0.8), memory), np.ones(COUNT, bool)
+    law = Law(5e-4, 4e-3, (0.06, 0.8), memory)
     factor = np.linalg.cholesky(covariance(law, windows, responses))
     residual = (factor @ np.random.default_rng(seed).normal(size=(COUNT, 3 * ROWS, 1)))[..., 0]
-    given = sample(residual, starts, windows, responses, use)
+    given = sample(residual, starts, windows, responses)
     sizes = sizes_by_memory(law, given)
     assert [sized.law.slip_time for sized in sizes] == list(MEMORIES)
     draws = draw_laws(sizes, given, 400, seed=1)
@@ -185,7 +182,7 @@ def test_drawn_memories_lie_about_the_true_one(made, seed):
 
 def test_a_law_without_slip_has_no_memory_to_draw(made):
     windows, responses, starts = made
-    given = sample(np.zeros((COUNT, 3 * ROWS)), starts, windows, responses, np.ones(COUNT, bool))
+    given = sample(np.zeros((COUNT, 3 * ROWS)), starts, windows, responses)
     draws = draw_laws(sizes_by_memory(Law(5e-4, 4e-3), given), given, 50)
     assert draws.slip_time is None
     assert draws.deviations.shape == (2, 50)

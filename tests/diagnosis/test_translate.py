@@ -10,6 +10,7 @@ from jaxident.diagnosis.diagnose import compare_parameters
 from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.translate import effect_of, to_model
 from jaxident.effects.coordinates import PLACES, free_places, neutral_vector
+from jaxident.log import make_log
 
 PLACE = {key: PLACES["traction_limit", key] for key in ("inverse_square", "dry", "spin")}
 
@@ -44,9 +45,9 @@ def test_a_limit_that_never_acts_is_none_of_the_model_and_has_no_size():
     vector = neutral_vector(np.ones(10))
     vector[PLACES["turn_loss", "loss"]] = 0.3
     solution = Solution(vector, None, places, None, 0.0, 1e-6 * np.eye(len(places)), 1)
-    log = SimpleNamespace(runs=lambda: [SimpleNamespace(t=0.03 * np.arange(9))])
+    log = make_log(0.03 * np.arange(9), np.ones(9), np.ones(9))
     prepared = SimpleNamespace(log=log, largest=1.0)
-    model = to_model(prepared, solution, Law(1e-3, 5e-3), effects)
+    model = to_model(prepared, vector, Law(1e-3, 5e-3), effects, None, solution)
     assert [effect.name for effect in model.effects] == ["turn_loss"]
     finding = SimpleNamespace(candidates={effects: SimpleNamespace(solution=solution)}, selected=effects)
     rows = compare_parameters(prepared, finding, vector, effects)

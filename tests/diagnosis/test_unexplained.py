@@ -24,16 +24,15 @@ def made():
     rng, windows = np.random.default_rng(3), along_arcs(ROWS, COUNT)
     residual, slopes, idle = (1e-3 * rng.normal(size=(COUNT, 3 * ROWS, k)) for k in (1, 2, 1))
     linear = Linear(residual[..., 0], slopes, answer_to_start(RATES, residual[..., 0], windows))
-    use = np.arange(COUNT) != 2
     responses = respond(RATES, residual[..., 0], windows)
-    return SimpleNamespace(linear=linear, places=[0, 1]), Data(windows, None, use), 1e-6 * idle, responses
+    return SimpleNamespace(linear=linear, places=[0, 1]), Data(windows, None), 1e-6 * idle, responses
 
 
 def dense(law, solution, data, responses):
     """Restricted log-likelihood up to a constant: start states free in every window, coordinates in all."""
     linear, total = solution.linear, covariance(law, data.windows, responses)
     volume, squares = 0.0, np.zeros((3, 3))
-    for k in np.flatnonzero(data.use):
+    for k in range(COUNT):
         inverse, starts = np.linalg.inv(total[k]), linear.starts[k]
         information = starts.T @ inverse @ starts
         inverse = inverse - inverse @ starts @ np.linalg.solve(information, starts.T @ inverse)

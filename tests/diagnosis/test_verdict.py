@@ -11,7 +11,7 @@ from jaxident.diagnosis.causes.corrector import Term
 from jaxident.diagnosis.diagnose import decide
 from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.simulator import Simulator
-from jaxident.diagnosis.verdict import alike, judge, slip_of_drive, unknown_probability
+from jaxident.diagnosis.verdict import alike, judge, slip_of_drive, unexplained_probability
 
 NONE: dict[str, float] = {}
 GAP = made_up("effects").gap
@@ -28,7 +28,7 @@ def finding(gains, selected, terms=()):
 
 
 def whole(judgement):
-    return judgement.none + judgement.unknown + sum(p for _, p in judgement.sets)
+    return sum(p for _, p in judgement.sets)
 
 
 def test_a_large_gain_names_its_effect():
@@ -80,10 +80,10 @@ def test_a_further_effect_must_bring_a_part_of_all_that_is_explained():
 def test_what_the_corrector_explains_beside_a_poor_effect_is_unknown():
     term = (Term("drive", "v^3 in the acceleration along"), 400.0)
     found = finding({("slope",): 300.0}, ("slope",), [term])
-    assert unknown_probability(found, GAP) > 0.95
+    assert unexplained_probability(found, GAP) > 0.95
     assert judge(found, GAP, NONE).sites["drive"] > 0.9
-    assert unknown_probability(finding({("slope",): 9000.0}, ("slope",), [term]), GAP) < 0.05
-    assert unknown_probability(finding({}, (), [(term[0], 10.0)]), GAP) < 0.2
+    assert unexplained_probability(finding({("slope",): 9000.0}, ("slope",), [term]), GAP) < 0.05
+    assert unexplained_probability(finding({}, (), [(term[0], 10.0)]), GAP) < 0.2
 
 
 def test_what_the_corrector_explains_as_well_makes_a_further_effect_doubtful():
@@ -108,8 +108,8 @@ def test_what_the_simulator_has_too_is_no_gap():
 
 def test_errors_beyond_the_floor_on_runs_kept_for_judging_are_unknown():
     found = finding({("slope",): 500.0}, ("slope",))
-    assert unknown_probability(found, GAP) < 0.05
-    assert unknown_probability(found, GAP._replace(errors=10.0 * GAP.errors)) > 0.95
+    assert unexplained_probability(found, GAP) < 0.05
+    assert unexplained_probability(found, GAP._replace(errors=10.0 * GAP.errors)) > 0.95
 
 
 def test_more_slip_than_wheels_have_is_unknown():
@@ -118,17 +118,17 @@ def test_more_slip_than_wheels_have_is_unknown():
         return finding({}, ())._replace(law=law)
 
     assert slip_of_drive(slipping(0.01)) == pytest.approx(0.01)
-    assert unknown_probability(slipping(0.01), OPEN) < 0.05
+    assert unexplained_probability(slipping(0.01), OPEN) < 0.05
     found = judge(slipping(0.1), OPEN, NONE)
-    assert found.unknown > 0.95
+    assert found.unexplained > 0.95
     assert found.sites["drive"] + found.sites["contact"] > 0.7
 
 
 def test_slip_that_is_a_small_part_of_what_an_effect_explains_is_not():
     sliding = finding({("traction_limit",): 3000.0}, ("traction_limit",))
     sliding = sliding._replace(law=Law(1e-3, 5e-3, (0.1, 1.0), 0.2))
-    assert unknown_probability(sliding, GAP._replace(refitted=1120.0, after=100.0)) < 0.1
-    assert unknown_probability(sliding, GAP._replace(refitted=1120.0, after=400.0)) > 0.95
+    assert unexplained_probability(sliding, GAP._replace(refitted=1120.0, after=100.0)) < 0.1
+    assert unexplained_probability(sliding, GAP._replace(refitted=1120.0, after=400.0)) > 0.95
 
 
 def test_slip_is_held_against_the_drive_of_the_robot_and_not_of_a_nominal_model_that_bends():
@@ -144,22 +144,42 @@ def test_what_the_simulator_leaves_unexplained_too_is_no_difference():
 
     def both(part, rest):
         law = Law(1e-3, 5e-3, (part, part * 10.0), 0.2)
-        data = SimpleNamespace(use=np.ones(10, bool))
+        data = SimpleNamespace(windows=SimpleNamespace(run=np.zeros(10)))
         return finding({("slope",): 300.0}, ("slope",), [(term[0], rest)])._replace(law=law, data=data)
 
     robot = both(0.1, 400.0)
-    assert unknown_probability(robot, OPEN) > 0.95
-    assert unknown_probability(robot, OPEN, Simulator(np.zeros(3), (), both(0.1, 400.0))) < 0.05
-    assert unknown_probability(robot, OPEN, Simulator(np.zeros(3), (), both(0.1, 40.0))) > 0.95, "terms"
-    assert unknown_probability(robot, OPEN, Simulator(np.zeros(3), (), both(0.01, 400.0))) > 0.95, "slip"
+    assert unexplained_probability(robot, OPEN) > 0.95
+    assert unexplained_probability(robot, OPEN, Simulator(np.zeros(3), (), both(0.1, 400.0))) < 0.05
+    assert unexplained_probability(robot, OPEN, Simulator(np.zeros(3), (), both(0.1, 40.0))) > 0.95, "terms"
+    assert unexplained_probability(robot, OPEN, Simulator(np.zeros(3), (), both(0.01, 400.0))) > 0.95, "slip"
 
 
 def test_one_stretch_kept_for_judging_decides_nothing():
     found = made_up("effects")
 
-    def verdict(names):
-        prepared = found.prepared._replace(naming=np.arange(15) < names)
-        return decide(prepared, found.judgement, found.parameters)
+    def verdict(names, judges):
+        windows, judging = SimpleNamespace(run=np.zeros(names)), SimpleNamespace(row=np.zeros(judges))
+        prepared = found.prepared._replace(windows=windows, judging=judging)
+        return decide(prepared, found.judgement, found.selected, found.parameters)
 
-    assert verdict(9) == "effects"
-    assert verdict(14) == "undecided"
+    assert verdict(9, 6) == "effects"
+    assert verdict(14, 1) == "undecided"
+    assert verdict(5, 6) == "undecided"
+
+
+def test_a_rest_lowers_no_name():
+    """Twice the same evidence for a name, once beside a large rest: two statements."""
+    term, judged = Term("drive", "v^3 in the acceleration along"), []
+    for terms in ([], [(term, 400.0)]):
+        judged.append(judge(finding({("slope",): 900.0}, ("slope",), terms), GAP, NONE))
+    alone, beside = judged
+    assert beside.causes[0].probability == pytest.approx(alone.causes[0].probability, abs=1e-6)
+    assert alone.unexplained < 0.1
+    assert beside.unexplained > 0.9
+    assert beside.gap > alone.none
+    full = made_up("effects")
+    prepared = full.prepared._replace(
+        windows=SimpleNamespace(run=np.zeros(9)), judging=SimpleNamespace(row=np.zeros(9))
+    )
+    assert [decide(prepared, one, ("slope",), []) for one in judged] == ["effects", "partly"]
+    assert [decide(prepared, one, (), []) for one in judged] == ["no_gap", "unknown"]

@@ -104,7 +104,7 @@ def test_beside_a_rival_there_is_a_single_effect_left_to_grow_from(exchange, mon
         monkeypatch.setattr(module, "refit", lambda data, vector, starts, effects: fit(effects))
     monkeypatch.setattr(which, "resized", lambda *args, **options: Law(0.5, 1.0))
     monkeypatch.setattr(which, "whiten", lambda *args: (data, None))
-    data = SimpleNamespace(windows=None, use=None)
+    data = SimpleNamespace(windows=None)
 
     def fit(effects):
         return SimpleNamespace(cost=costs.get(tuple(effects), 850.0), vector=np.zeros(SIZE), starts=None)

@@ -30,12 +30,15 @@ OUTSIDE = DELAY | {
 
 def says(*selected, verdict="effects", alike=None, p=0.9, site="actuation", channel="along"):
     """A diagnosis as `jaxident diagnose` writes it."""
-    sets = [{"effects": list(selected), "p": p}] if selected else []
-    rest = 1.0 - (p if selected else 0.0)
+    sets = (
+        [{"effects": list(selected), "p": p}, {"effects": [], "p": 1.0 - p}]
+        if selected
+        else [{"effects": [], "p": 1.0}]
+    )
     return {
-        "schema": "jaxident.diagnosis/1",
+        "schema": "jaxident.diagnosis/2",
         "verdict": verdict,
-        "probability": {"none": rest, "unknown": 0.0, "sets": sets},
+        "probability": {"gap": 1.0 - sets[-1]["p"], "unexplained": 0.0, "sets": sets},
         "selected": list(selected),
         "causes": [{"effect": name, "indistinguishable_from": (alike or {}).get(name, [])} for name in selected],
         "where": {"site": {site: 0.8, "camera": 0.1}, "channels": {channel: 0.7, "lateral": None}},
@@ -49,6 +52,7 @@ def says(*selected, verdict="effects", alike=None, p=0.9, site="actuation", chan
         (DELAY, says("motor_lag"), False, False, False, True),
         (DELAY, says("motor_lag", alike={"motor_lag": ["transport_delay"]}), True, False, True, False),
         (DELAY, says("transport_delay", "slope"), False, False, True, True),
+        (DELAY, says("transport_delay", verdict="partly"), True, True, True, False),
         (DELAY, says("transport_delay", verdict="undecided"), False, False, False, False),
         (DELAY, says(verdict="no_gap"), False, False, False, False),
         (DELAY, None, False, False, False, False),
@@ -71,10 +75,12 @@ def test_one_name_for_two_effects_is_not_both():
     assert not mark(PAIR, says("motor_lag", alike=alike))["right"]
 
 
-@pytest.mark.parametrize("verdict", ["effects", "unknown", "no_gap", "parameters", "undecided"])
-def test_only_effects_and_unknown_claim_a_gap(verdict):
-    assert mark(NONE, says(verdict=verdict))["claimed"] is (verdict in ("effects", "unknown"))
-    assert mark(NONE, says(verdict=verdict))["right"] is None
+@pytest.mark.parametrize("verdict", ["effects", "partly", "unknown", "no_gap", "parameters", "undecided"])
+def test_which_verdicts_claim_a_gap_and_which_a_rest(verdict):
+    found = mark(NONE, says(verdict=verdict))
+    assert found["claimed"] is (verdict in ("effects", "partly", "unknown"))
+    assert found["unexplained"] is (verdict in ("partly", "unknown"))
+    assert found["right"] is None
 
 
 def test_site_and_channel():
@@ -94,10 +100,10 @@ def test_probabilities():
     assert mark(DELAY, says("slope", p=0.7))["probability_of_truth"] == 0.0
     assert mark(NONE, says())["top"] == (1.0, True)
     assert mark(NONE, None)["top"] is None
-    outside = says(verdict="unknown") | {"probability": {"none": 0.2, "unknown": 0.8, "sets": []}}
+    outside = says(verdict="unknown") | {"probability": {"gap": 0.9, "unexplained": 0.8, "sets": []}}
     assert mark(OUTSIDE, outside)["top"] == (0.8, True)
-    assert mark(OUTSIDE, outside)["unknown"]
-    sets = [{"effects": ["motor_lag"], "p": 0.5}, {"effects": ["transport_delay"], "p": 0.4}]
-    both = says("motor_lag") | {"probability": {"none": 0.1, "unknown": 0.0, "sets": sets}}
+    assert mark(OUTSIDE, outside)["unexplained"]
+    sets = [{"effects": ["motor_lag"], "p": 0.5}, {"effects": ["transport_delay"], "p": 0.4}, {"effects": [], "p": 0.1}]
+    both = says("motor_lag") | {"probability": {"gap": 0.9, "unexplained": 0.0, "sets": sets}}
     assert mark(DELAY, both)["top"] == (0.5, False)
     assert mark(DELAY, both)["probability_of_truth"] == pytest.approx(0.4)

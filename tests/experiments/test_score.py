@@ -37,7 +37,7 @@ def test_calibration_error():
 
 def marks(kind, count, **more):
     base = {
-        "kind": kind, "verdict": "effects", "claimed": True, "unknown": False, "right": True, "strict": True,
+        "kind": kind, "verdict": "effects", "claimed": True, "unexplained": False, "right": True, "strict": True,
         "some": True, "extra": False, "site": True, "channel": None, "top": (0.8, True), "probability_of_truth": 0.8,
         "strength": [0.5], "selected": ["slope"],
     }  # fmt: skip
@@ -46,12 +46,12 @@ def marks(kind, count, **more):
 
 def test_table():
     given = marks("none", 20, claimed=False) + marks("none", 1) + marks("single", 9, shrink=0.9, interval=[0.8, 1.0])
-    given += marks("single", 1, right=False, shrink=0.5, interval=[0.6, 0.7]) + marks("outside", 4, unknown=True)
+    given += marks("single", 1, right=False, shrink=0.5, interval=[0.6, 0.7]) + marks("outside", 4, unexplained=True)
     rows = {row["row"]: row for row in table(given)}
     assert rows["effect claimed when there is none"]["value"] == pytest.approx(1 / 21)
     assert rows["one effect: named"]["value"] == pytest.approx(0.9)
     assert rows["one effect: named"]["interval"] == pytest.approx(wilson(9, 10))
-    assert rows["outside the catalogue: unknown"]["value"] == 1.0
+    assert rows["outside the catalogue: told as unexplained"]["value"] == 1.0
     assert rows["two effects: both named"]["value"] is None
     assert rows["shrink achieved over achievable, median"]["value"] == pytest.approx(0.9)
     assert rows["shrink inside its 90 % interval"]["value"] == pytest.approx(0.9)
@@ -126,6 +126,7 @@ def test_diagnoses_are_run_and_judged(tmp_path):
 def test_every_miss_is_a_row():
     answer = {"effects": [{"name": "slope"}], "strength": [0.5], "slip": 0.01, "inputs": "multilevel"}
     right = {"kind": "single", "right": True, "site": True, "channel": None, "claimed": True, "selected": ["slope"]}
+    right |= {"unexplained": False}
     marks = {"case_1": right, "case_2": right | {"site": False, "interval": [0.2, 0.4], "shrink": 0.5}}
     rows = misses(dict.fromkeys(marks, answer), marks).splitlines()
     said = "site, shrink 0.200 to 0.400 said, 0.500 true"

@@ -36,8 +36,8 @@ class Row(NamedTuple):
 
 
 class Account(NamedTuple):
-    """Rows in the order camera, start, slip, effects, discovered, rest, whose shares add up to one, over the horizon [s]
-    from so many starts; `failed`: starts from which some model's prediction is not finite, which count in none."""
+    """Rows in the order camera, start, slip, effects, discovered, rest, whose shares add up to one, over the horizon
+    [s] from so many starts; `failed`: starts from which some model's prediction is not finite, which count in none."""
 
     horizon: float
     windows: int
@@ -76,8 +76,8 @@ def account_of(
     unit: Array,
     seed: int = 0,
 ) -> Account:
-    """The account from errors (starts, 3) of the model with each set of players, and the floor of that with all of them;
-    unit (3,): the camera's variances."""
+    """The account from errors (starts, 3) of the model with each set of players, and the floor of that with all of
+    them; unit (3,): the camera's variances."""
     kept = np.all([np.isfinite(error).all(axis=1) for error in errors.values()], axis=0)
     squares = {joined: error[kept] ** 2 for joined, error in errors.items()}
     total, left = squares[frozenset()], squares[frozenset(players)]

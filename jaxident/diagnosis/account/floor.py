@@ -79,8 +79,9 @@ def _spread(
         own = draws.deviations[:, here] ** 2
         middle = np.sqrt(own.mean(axis=1))
         time = None if draws.slip_time is None else float(np.median(draws.slip_time[here]))
-        one = Law(*middle[:2], None if time is None else tuple(middle[2:4]), time,
-                  None if law.coloured is None else tuple(middle[-2:]), law.coloured_time)  # fmt: skip
+        slip = None if time is None else (middle[2], middle[3])
+        coloured = None if law.coloured is None else (middle[-2], middle[-1])
+        one = Law(middle[0], middle[1], slip, time, coloured, law.coloured_time)
         whole = _variances(model, prepared, one)
         seen_by = own[:2] if law.coloured is None else own[:2] + own[-2:]
         flat = (seen_by / seen_by.mean(axis=1, keepdims=True))[[0, 0, 1]]

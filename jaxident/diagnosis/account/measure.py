@@ -1,5 +1,5 @@
-"""The gap on rows kept for judging: before, refitted, corrected; who causes it; where it lies; how far each effect shrinks
-it."""
+"""The gap on rows kept for judging: before, refitted, corrected; who causes it; where it lies; how far each effect
+shrinks it."""
 
 import dataclasses
 from typing import Any, NamedTuple
@@ -118,10 +118,10 @@ def measure(prepared: Prepared, finding: Finding, given: Model | None, common, d
     shrinks = {c.effects[0]: shrink(judge_model(single(prepared, c, law), prepared)) for c in told_alone}
     placebo = (alone[-1].effects[0], shrinks[alone[-1].effects[0]]) if alone else None
     kept = np.isfinite(errors).all(axis=(0, 2))
-    means = [float(np.mean(own[kept])) if kept.any() else float("nan") for own in errors]
-    ends = tuple(float(q) for q in np.quantile(floor.draws, [LOW, HIGH]))
-    gap = Gap(prepared.horizon, *means, level, (ends[0], ends[1]), shrink(everybody), placebo, errors, floor, unit,
-              int(everybody.run_up.sum()))  # fmt: skip
+    given_level, refitted, after = (float(np.mean(own[kept])) if kept.any() else float("nan") for own in errors)
+    low, high = (float(q) for q in np.quantile(floor.draws, [LOW, HIGH]))
+    gap = Gap(prepared.horizon, given_level, refitted, after, level, (low, high), shrink(everybody), placebo, errors,
+              floor, unit, int(everybody.run_up.sum()))  # fmt: skip
     moved = None
     if players and finding.unexplained <= UNEXPLAINED:
         moved = _moved(everybody, judge_model(without(bare, players), prepared), unit)

@@ -23,14 +23,14 @@ class Shrink(NamedTuple):
 def shrink_of(
     refitted: Array, after: Array, floor: float, draws: Array, wander: Array, seed: int = 0, least: Array | None = None
 ) -> Shrink:
-    """The shrink from squared errors (starts, 3) over the camera's variance, before and after; none where the gap before
-    does not stand out from the floor.
+    """The shrink from squared errors (starts, 3) over the camera's variance, before and after; none where the gap
+    before does not stand out from the floor.
 
     What is saved, refitted - after, is free of the floor: both share the noise. What is left, after - floor, is known
     as well as starts agree and as laws do that are as likely (`draws` of the floor). The interval's lower end knows
-    that no model misses by less than the uncertainty of its own parameters does (`wander` (draws,)): where noise happens
-    to be low, after < floor, the shrink is above 1, but not surely. It is that of a lower floor if that may be the true
-    one (`least` (draws,)).
+    that no model misses by less than the uncertainty of its own parameters does (`wander` (draws,)): where noise
+    happens to be low, after < floor, the shrink is above 1, but not surely. It is that of a lower floor if that may be
+    the true one (`least` (draws,)).
     """
     kept = np.isfinite(refitted).all(axis=1) & np.isfinite(after).all(axis=1)
     refitted, after = refitted[kept].mean(axis=1), after[kept].mean(axis=1)

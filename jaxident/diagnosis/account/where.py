@@ -42,8 +42,8 @@ class Place(NamedTuple):
 def locate(
     errors: Array, floor: Array, path: Array, prepared: Prepared, moved: Array | None = None, seed: int = 0
 ) -> Place:
-    """From the nominal model's squared errors and their floor (starts, 3) at the horizon, the best one's predicted poses
-    (starts, rows, 3), and the squares that its effects move (starts, 3), None without effects."""
+    """From the nominal model's squared errors and their floor (starts, 3) at the horizon, the best one's predicted
+    poses (starts, rows, 3), and the squares that its effects move (starts, 3), None without effects."""
     kept = np.isfinite(errors).all(axis=1)
     if not kept.any():
         nothing = dict.fromkeys(CHANNELS, 0.0)

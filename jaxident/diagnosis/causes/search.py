@@ -27,7 +27,8 @@ class Data(NamedTuple):
 
 
 class Solution(NamedTuple):
-    """A fit: vector (SIZE,), starts (5, windows), the linearisation there in `places`, half the squares, and the covariance of the free coordinates."""
+    """A fit: vector (SIZE,), starts (5, windows), the linearisation there in `places`, half the squares, and the
+    covariance of the free coordinates."""
 
     vector: Any
     starts: Any

@@ -86,7 +86,8 @@ def uncut(commands: Array, period: float) -> Windows:
     t = np.tile(period * np.arange(samples)[:, None], (1, count))
     return Windows(
         t=t, session=np.zeros(count), command=np.asarray(commands).transpose(1, 0, 2), step=np.full(t.shape, period),
-        pose=np.zeros((*t.shape, 3)), seen=np.ones(t.shape, bool), run=np.arange(count), first=np.zeros(count, int), row=np.zeros(count, int),
+        pose=np.zeros((*t.shape, 3)), seen=np.ones(t.shape, bool), run=np.arange(count),
+        first=np.zeros(count, int), row=np.zeros(count, int),
     )  # fmt: skip
 
 
