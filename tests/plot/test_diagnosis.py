@@ -55,3 +55,14 @@ def test_shrinks_are_in_per_cent_with_all_groups():
     low, high = ax.get_xlim()
     assert low < 0.0
     assert high > 100.0
+
+
+def test_the_waterfall_adds_up_to_all():
+    shares = {"camera": 0.1, "delay": 0.85, "marker": -0.05, "rest": 0.1}
+    ax = plot.waterfall(shares, {name: (s - 0.02, s + 0.02) for name, s in shares.items()}, notes={"delay": "8 mm"},
+                        noise=["camera"])  # fmt: skip
+    bars = sorted(ax.patches, key=lambda bar: bar.get_y())
+    np.testing.assert_allclose([bar.get_width() for bar in bars], [10.0, 85.0, -5.0, 10.0])
+    np.testing.assert_allclose([bar.get_x() for bar in bars], [0.0, 10.0, 95.0, 90.0])
+    assert [text.get_text() for text in ax.texts if text.get_text()] == ["8 mm"]
+    assert len({tuple(bar.get_facecolor()) for bar in bars}) == 3

@@ -9,7 +9,7 @@ import pytest
 
 from jaxident.array_types import AT_REST, Pose
 from jaxident.robot.drive import Force, Physical, hold
-from jaxident.robot.noise import Noise, UnitNoise, draw_noise, observe, slip
+from jaxident.robot.noise import Noise, UnitNoise, draw_noise, draw_white, observe, slip
 from jaxident.robot.simulate import run_forces
 
 DRAWS = 4000
@@ -73,3 +73,33 @@ def test_slip_of_one_step():
     unit = UnitNoise(*(jnp.full(1, value) for value in (0.0, 0.0, 0.0, 2.0, -3.0)))
     drawn = slip(Noise(slip_along=0.5, slip_heading=0.1), unit, 0.25)
     assert (float(drawn.along[0]), float(drawn.heading[0])) == pytest.approx((2.0, -0.6), rel=1e-15)
+
+
+@pytest.mark.parametrize("step", [0.05, np.array([0.01, 0.2, 0.03, 0.5, 0.08, 1.0])], ids=["even", "uneven"])
+def test_slip_with_a_memory_has_the_law_it_is_named_for(step):
+    """Variance density^2 / (2 tau), correlation exp(-|t_i - t_j| / tau); standard error sqrt((1 + rho^2) / draws)."""
+    noise, rows = Noise(slip_along=0.3, slip_heading=2.0, slip_time=0.2), 6
+    found = jax.vmap(lambda key: slip(noise, draw_noise(key, rows), step))(KEYS)
+    between = np.broadcast_to(step, rows) if np.ndim(step) == 0 else step
+    times = np.concatenate([[0.0], np.cumsum(between[: rows - 1])])
+    expected = np.exp(-np.abs(times[:, None] - times) / 0.2)
+    for channel, density in zip(found, (0.3, 2.0), strict=True):
+        unit = np.asarray(channel) / density * np.sqrt(2.0 * 0.2)
+        assert np.all(np.abs(unit.T @ unit / DRAWS - expected) < 4.5 * np.sqrt((1 + expected**2) / DRAWS))
+
+
+def test_a_white_part_stands_beside_the_memory():
+    """Variance of the whole, covariance of the part with a memory."""
+    noise = Noise(position=1.0, heading=2.0, correlation_time=0.3, white_position=0.6, white_heading=1.6)
+
+    def error(key):
+        white = draw_white(noise, key, 5)
+        return observe(Pose(*jnp.zeros((3, 5))), noise, draw_noise(key, 5), 0.1, white)
+
+    found = jax.vmap(error)(KEYS)
+    kept = np.exp(-0.1 * np.abs(np.arange(5)[:, None] - np.arange(5)) / 0.3)
+    for channel, whole, white in zip(found, (1.0, 1.0, 2.0), (0.6, 0.6, 1.6), strict=True):
+        expected = (whole**2 - white**2) * kept + white**2 * np.eye(5)
+        covariance = np.asarray(channel).T @ np.asarray(channel) / DRAWS
+        assert np.all(np.abs(covariance - expected) < 6.0 * whole**2 / np.sqrt(DRAWS))
+    assert draw_white(Noise(1.0, 2.0, 0.3), KEYS[0], 5) is None

@@ -64,16 +64,23 @@ def noise_of(model: Model) -> tuple[Noise, bool]:
 
 
 def law_of(noise: Noise, period: float) -> Law:
-    """The law of a model's noise at a sample period [s]: slip independent from step to step, as it is drawn."""
+    """The law of a model's noise at a sample period [s]: slip without a memory independent from step to step, as it is
+    drawn."""
     slip = float(noise.slip_along or 0.0), float(noise.slip_heading or 0.0)
-    camera = float(noise.position), float(noise.heading)
-    coloured = noise.correlation_time is not None
+    whole, white = np.array([noise.position, noise.heading], float), np.zeros(2)
+    if noise.correlation_time is None:
+        white, memory = whole, None
+    else:
+        white = white if noise.white_position is None else np.array([noise.white_position, noise.white_heading], float)
+        memory = np.sqrt(whole**2 - white**2)
+    time = noise.slip_time
+    scale = np.sqrt(period if time is None else 2.0 * time)
     return Law(
-        *((0.0, 0.0) if coloured else camera),
-        slip=tuple(density / np.sqrt(period) for density in slip) if any(slip) else None,
-        slip_time=1e-3 * period if any(slip) else None,
-        coloured=camera if coloured else None,
-        coloured_time=float(noise.correlation_time) if coloured else None,
+        *white.tolist(),
+        slip=(slip[0] / scale, slip[1] / scale) if any(slip) else None,
+        slip_time=(1e-3 * period if time is None else float(time)) if any(slip) else None,
+        coloured=None if memory is None else (float(memory[0]), float(memory[1])),
+        coloured_time=None if noise.correlation_time is None else float(noise.correlation_time),
     )
 
 
