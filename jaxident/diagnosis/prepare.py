@@ -40,6 +40,7 @@ LONGEST, SHORTEST = 60, 20
 """Rows of a horizon where none is asked for: cost grows with their cube, sensitivity with their number."""
 HORIZON = 1.0
 """Horizon [s] where none is asked for."""
+TOO_SHORT = "{} rows make {} windows of {} rows and none to judge by: record longer runs, or three of them"
 
 
 class Prepared(NamedTuple):
@@ -92,10 +93,7 @@ def prepare(
     fitted = blind(fitted, frozen)
     windows = stretches(fitted, BURN + rows, pieces)
     if like is None and not len(judging.row):
-        raise InputError(
-            f"{len(log.t)} rows make {len(windows.run)} windows of {BURN + rows} rows and none to judge by: record "
-            "longer runs, or three of them"
-        )
+        raise InputError(TOO_SHORT.format(len(log.t), len(windows.run), BURN + rows))
     vector = neutral_vector(starting_point(fitted, pieces) if nominal is None else nominal)
     first = rough_fit(windows, vector, law)
     here = given, largest

@@ -35,11 +35,12 @@ def test_simple_ways_find_plain_effects(names, drawn):
 
 
 def test_full_refits_predict_runs_kept_apart_best_with_what_is_there(drawn):
-    """With it they miss by little more than the camera's variance, which start states from 20 poses add to."""
+    """With it they miss by little more than the camera's variance, which the filtered start adds to; without, by many
+    times that."""
     _, runs = drawn[NAMES.index(["lateral_slip"])]
     errors = refit_errors(runs)
     assert baselines.smallest(errors)["selected"] == ["lateral_slip"]
-    assert errors["lateral_slip"] < 3.0 < 0.1 * errors[""]
+    assert errors["lateral_slip"] < 3.0 < 0.2 * errors[""]
 
 
 @pytest.fixture
