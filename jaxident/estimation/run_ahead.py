@@ -23,9 +23,9 @@ FORGOTTEN = 200
 DIVERGED = 9.0
 """Mean square of normalised innovations over the burn-in, three channels alike and none counted beyond `LIMIT`, above
 which a filter has not converged: three deviations where one is expected."""
-LANES, BLOCK = 32, 128
-"""Stretches that one call of the compiled program takes: 8, or a multiple of LANES up to BLOCK, so that there are few
-shapes to compile for."""
+LANES, ROWS = (8, 32, 128), 64
+"""Stretches that one call of the compiled program takes, and what their rows are a multiple of: a shape takes seconds to
+compile, so there are few."""
 
 
 class Ahead(NamedTuple):
@@ -56,34 +56,35 @@ def run_ahead(model: Model, log: Log, starts: Starts, horizon: int, *, burn_in: 
     slips = float(noise.slip_along) > 0.0 or float(noise.slip_heading) > 0.0
     before = max(burn_in, FORGOTTEN) if slips else burn_in
     step = float(np.median(np.concatenate([np.diff(run.t) for run in log.runs()])))
-    lead = int(np.ceil(RUN_UP / step)) if model.effects else 0
+    first = int(np.ceil(RUN_UP / step)) + before
     chance = {effect.name: effect.parameters for effect in model.effects}
     if "frozen_frames" in chance:
         log = blind(log, repeats(log))
     lost = chance["lost_commands"]["probability"] if "lost_commands" in chance else None
-    stretch = cut_stretches(log, starts, lead, before, horizon, session_time)
-    first = lead + before
+    filler = -(first + 1 + horizon) % ROWS
+    stretch = cut_stretches(log, starts, first - before, before, horizon + filler, session_time)
+    ahead = slice(first + 1, first + 1 + horizon)
 
     def run(vector: Array, stretch: Stretch) -> Run:
         return _in_blocks(vector, noise, lost, stretch, first)
 
-    found, run_up = _filtered(partial(run, vector_of(model)), stretch, first, burn_in)
-    pose, begin, slip = (np.moveaxis(leaf[first + 1 :], -1, 0) for leaf in found[:3])
+    found, run_up = _filtered(partial(run, vector_of(model)), stretch, ahead, burn_in)
+    pose, begin, slip = (np.moveaxis(leaf[ahead], -1, 0) for leaf in found[:3])
     slopes = [
-        (np.moveaxis(run(vector_of(other), stretch).pose[first + 1 :], -1, 0) - pose) / size
+        (np.moveaxis(run(vector_of(other), stretch).pose[ahead], -1, 0) - pose) / size
         for other, size in directions(model)
     ]
     return Ahead(pose, begin, slip, np.array(slopes).reshape(-1, *pose.shape), run_up)
 
 
-def _filtered(run: Callable[[Stretch], Run], stretch: Stretch, first: int, burn_in: int) -> tuple[Run, Array]:
-    """The filter and the free run of every stretch; where it does not converge, a run-up of the commands from rest,
-    laid on the last pose; and where that is."""
+def _filtered(run: Callable[[Stretch], Run], stretch: Stretch, ahead: slice, burn_in: int) -> tuple[Run, Array]:
+    """The filter and the free run of every stretch, over the rows `ahead`; where it does not converge, a run-up of the
+    commands from rest, laid on the last pose; and where that is."""
     found = run(stretch)
-    late = slice(max(first - burn_in + 1, 0), first + 1)
+    late = slice(max(ahead.start - burn_in, 0), ahead.start)
     seen = np.maximum(stretch.seen[late].sum(axis=0), 1)
     misses = found.innovation[late].sum(axis=0) / (3.0 * seen)
-    lost = ~(np.isfinite(found.pose[-1]).all(axis=0) & (misses < DIVERGED))
+    lost = ~(np.isfinite(found.pose[ahead.stop - 1]).all(axis=0) & (misses < DIVERGED))
     if not lost.any():
         return found, lost
     rows = np.arange(len(stretch.t))[:, None]
@@ -96,17 +97,17 @@ def _filtered(run: Callable[[Stretch], Run], stretch: Stretch, first: int, burn_
     return Run(*(np.where(lost, new, old) for new, old in zip(again, found, strict=True))), lost
 
 
-_run_block = partial(jax.jit, static_argnames="before")(filter_and_run)
+_run_block = jax.jit(filter_and_run)
 
 
 def _in_blocks(vector: Array, noise: Noise, lost: float | None, stretch: Stretch, first: int) -> Run:
     """`filter_and_run` of any number of stretches; the last block is filled up with copies of its last one."""
     count = stretch.t.shape[1]
-    size, parts = 8 if count <= 8 else min(-(-count // LANES) * LANES, BLOCK), []
+    size, parts = next((n for n in LANES if n >= count), LANES[-1]), []
     for begin in range(0, count, size):
         chosen = np.minimum(np.arange(begin, begin + size), count - 1)
         block = Stretch(*(
             np.take(leaf, chosen, axis=axis) for leaf, axis in zip(stretch, AXES, strict=True)
         ))  # fmt: skip
-        parts.append(jax.tree.map(np.asarray, _run_block(vector, noise, lost, block, before=first)))
+        parts.append(jax.tree.map(np.asarray, _run_block(vector, noise, lost, block, first)))
     return Run(*(np.concatenate(leaves, axis=-1)[..., :count] for leaves in zip(*parts, strict=True)))
