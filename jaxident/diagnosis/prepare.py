@@ -48,7 +48,8 @@ class Prepared(NamedTuple):
 
     log: in the user's units, poses as they were measured. largest: the command that the search has as its unit.
     windows: those that fit and name, commands over `largest`; frames: of the rows that they were cut from. judging:
-    rows from which predictions are judged, `rows` rows or horizon [s] ahead, none of which the windows saw beyond.
+    rows from which predictions are judged, `rows` rows or horizon [s] ahead, none of which the windows saw beyond;
+    naming: the same of the rows that fit, in the log `fitted` of these alone.
     nominal, law: the nominal fit and the noise law. lost: the share of commands that never arrived, and the gain of
     saying so; the windows' commands are then those that did, those `sent` (rows of a piece, pieces, 2) are kept.
     """
@@ -57,6 +58,8 @@ class Prepared(NamedTuple):
     largest: float
     windows: Windows
     judging: Starts
+    naming: Starts
+    fitted: Log
     rows: int
     horizon: float
     frames: Frames
@@ -87,8 +90,8 @@ def prepare(
     rows, horizon = horizon_rows(horizon, period)
     roles = split(log, BURN + rows)
     pieces = roles.fit if law is None else sorted([*roles.fit, *roles.judge], key=lambda p: (p.run, p.first))
-    judging = judging_starts(log, roles.judge, rows)
     fitted = only(log, pieces)
+    judging, naming = judging_starts(log, roles.judge, rows), judging_starts(fitted, roles.fit, rows)
     frozen = find_repeats(fitted) if law is None else np.zeros(len(log.t), bool)
     fitted = blind(fitted, frozen)
     windows = stretches(fitted, BURN + rows, pieces)
@@ -96,13 +99,14 @@ def prepare(
         raise InputError(TOO_SHORT.format(len(log.t), len(windows.run), BURN + rows))
     vector = neutral_vector(starting_point(fitted, pieces) if nominal is None else nominal)
     first = rough_fit(windows, vector, law)
-    here = given, largest
+    found = Prepared(given, largest, windows, judging, naming, only(given, pieces), rows, horizon,
+                     Frames(frozen, frozen), first, law or first_law(windows))  # fmt: skip
     if law is not None:
-        return Prepared(*here, windows, judging, rows, horizon, Frames(frozen, frozen), first, law)
+        return found
     outlying, windows, first = without_outliers(fitted, windows, first, pieces)
     responses = respond(np.exp(first.vector[:2]), first.linear.residual, windows)
     law = size_noise(first.linear.residual, first.linear.starts, windows, responses)
-    return Prepared(*here, windows, judging, rows, horizon, frames_of(fitted, frozen, outlying), first, law)
+    return found._replace(windows=windows, frames=frames_of(fitted, frozen, outlying), nominal=first, law=law)
 
 
 def repaired(prepared: Prepared, lost: Lost, worth: float) -> Prepared:

@@ -24,8 +24,8 @@ DIVERGED = 9.0
 """Mean square of normalised innovations over the burn-in, three channels alike and none counted beyond `LIMIT`, above
 which a filter has not converged: three deviations where one is expected."""
 LANES, ROWS = (8, 32, 128), 64
-"""Stretches that one call of the compiled program takes, and what their rows are a multiple of: a shape takes seconds to
-compile, so there are few."""
+"""Stretches that one call of the compiled program takes, and what their rows are a multiple of: there are few shapes,
+for each takes seconds to compile."""
 
 
 class Ahead(NamedTuple):

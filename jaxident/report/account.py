@@ -40,8 +40,8 @@ def account_section(account: Account) -> Section:
 
 TEXT = (
     "The nominal model, its parameters refitted, predicts {horizon:.3g} s ahead from {windows} places in runs that "
-    "took no part in any fit. Its mean squared error is split into what noise makes, what each named effect makes, and what "
-    "is left."
+    "took no part in any fit. Its mean squared error is split into what noise makes, what each named effect makes, "
+    "and what is left."
 )
 PICTURE = (
     "Each bar begins where the one above ends; all together are the whole error. Grey: what no model can take away. "

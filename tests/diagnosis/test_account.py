@@ -3,6 +3,7 @@
 import dataclasses
 import itertools
 from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -11,9 +12,11 @@ import pytest
 from jaxident.diagnosis.account.account import account_of, shapley
 from jaxident.diagnosis.account.floor import Floor, floor_of
 from jaxident.diagnosis.account.judging import judge_model
+from jaxident.diagnosis.account.luck import luck, luck_of_chance
+from jaxident.diagnosis.account.slip_check import slip_seen
 from jaxident.diagnosis.motion.windows import whole_runs
 from jaxident.diagnosis.noise.doubt import Draws
-from jaxident.diagnosis.noise.law import Law, deviations, variances_of
+from jaxident.diagnosis.noise.law import Law, deviations, less_slip, variances_of
 from jaxident.diagnosis.prepare import judging_starts
 from jaxident.diagnosis.translate import noise_of
 from jaxident.effects.simulate import simulate
@@ -23,6 +26,7 @@ from jaxident.robot.model import Effect, Model
 from jaxident.study.synthetic import excite
 
 PERIOD, ROWS = 0.03, 30
+LONG = make_log(PERIOD * np.arange(3001), *np.ones((5, 3001)))
 ROBOT = Model(PERIOD, Physical(np.array([3.0, 5.0]), np.array([[0.5, 0.45], [9.0, -8.5]])), np.array([0.1, 0.12]))
 
 
@@ -50,7 +54,8 @@ def test_shares_add_up_and_intervals_hold_them():
     sizes = {(): 20.0, ("a",): 8.0, ("b",): 14.0, ("a", "b"): 1.5}
     errors = {frozenset(k): np.sqrt(v * unit) * rng.normal(size=(80, 3)) for k, v in sizes.items()}
     parts = [np.full((80, 3), part) * unit for part in (1.0, 0.2, 0.1)]
-    floor = Floor(*parts, {"outliers": 0.05 * np.ones((80, 3)) * unit}, np.full(400, 1.35), np.full(400, 1.2))
+    chance, lucky = {"outliers": 0.05 * np.ones((80, 3)) * unit}, {"outliers": rng.gamma(2.0, 0.025, 400)}
+    floor = Floor(*parts, chance, np.full(400, 1.35), np.full(400, 1.2), lucky, np.full(400, 1.35))
     found = account_of(1.0, errors, ("a", "b"), floor, unit)
     assert [row.part for row in found.rows] == ["camera", "start", "slip", "a", "b", "outliers", "discovered", "rest"]
     assert sum(row.share for row in found.rows) == pytest.approx(1.0, abs=1e-9)
@@ -65,10 +70,21 @@ def test_starts_that_some_model_fails_from_count_in_nothing_and_are_told():
     unit = np.ones(3)
     errors = {frozenset(): np.full((10, 3), 3.0), frozenset("a"): np.ones((10, 3))}
     errors[frozenset("a")][4] = np.nan
-    floor = Floor(*[np.full((10, 3), 0.3)] * 3, {}, np.full(400, 0.9), np.full(400, 0.9))
+    floor = Floor(*[np.full((10, 3), 0.3)] * 3, {}, *[np.full(400, 0.9)] * 2, {}, np.full(400, 0.9))
     found = account_of(1.0, errors, ("a",), floor, unit)
     assert (found.windows, found.failed) == (9, 1)
     assert found.share("a") == pytest.approx(8.0 / 9.0)
+
+
+class Rows(NamedTuple):
+    """What of `Prepared` judging needs."""
+
+    log: Any
+    judging: Any
+    naming: Any
+    fitted: Any
+    rows: int
+    frames: Any
 
 
 def driven(law, effects=(), runs=24, seed=0):
@@ -79,8 +95,8 @@ def driven(law, effects=(), runs=24, seed=0):
     keys = jax.random.split(jax.random.key(100 + seed), runs)
     logs = [simulate(model, log, key=key) for log, key in zip(plain, keys, strict=True)]
     log = join([type(one)(*map(np.asarray, one)) for one in logs])
-    prepared = SimpleNamespace(log=log, judging=judging_starts(log, whole_runs(log), ROWS), rows=ROWS, largest=1.0)
-    return model, prepared
+    starts, frames = judging_starts(log, whole_runs(log), ROWS), SimpleNamespace(poses=len(log.t))
+    return model, Rows(log, starts, starts, log, ROWS, frames)
 
 
 def sure(law, draws=400):
@@ -111,7 +127,50 @@ def test_the_floor_is_what_a_true_model_misses_by(kind):
     missed, told = np.mean(judged.error**2 / unit), np.mean(floor.total / unit)
     assert told == pytest.approx(missed, rel=0.45 if effects else 0.2)
     assert np.mean(floor.draws) == pytest.approx(told, rel=0.1)
+    assert np.quantile(floor.likely, 0.001) < missed < np.quantile(floor.likely, 0.999)
     assert set(floor.chance) == {effect.name for effect in effects}
+
+
+def test_what_noise_happens_to_leave_spreads_as_over_seeds():
+    """The spread of mean squares over twelve seeds of two runs, 18 starts each, has a standard error of 20 %."""
+    law, _ = LAWS["slipping"]
+    unit, found, told = deviations(law) ** 2, [], []
+    for seed in range(12):
+        model, prepared = driven(law, runs=2, seed=seed)
+        judged = judge_model(model, prepared)
+        camera = np.broadcast_to(unit, judged.error.shape)
+        expected = np.mean(sum(judged.squares) / unit) + 1.0
+        found.append(np.mean(judged.error**2 / unit) / expected)
+        told.append(np.std(luck(judged, camera, unit, 400)))
+    assert np.mean(found) == pytest.approx(1.0, abs=4.0 * np.std(found) / 12**0.5)
+    assert np.mean(told) == pytest.approx(np.std(found), rel=0.7)
+
+
+@pytest.mark.parametrize(("name", "parameters", "rate"), [
+    ("outliers", {"probability": 0.05, "position": 0.01, "heading": 0.1}, 0.05),
+    ("frozen_frames", {"probability": 0.2}, 0.2),
+])  # fmt: skip
+def test_rare_chance_spreads_as_rare_squares_do(name, parameters, rate):
+    """A square of a normal number that is there at a rate has the mean rate s^2 and the variance (3 rate - rate^2)."""
+    starts = judging_starts(LONG, whole_runs(LONG), ROWS)
+    prepared = Rows(LONG, starts, starts, LONG, ROWS, SimpleNamespace(poses=10**9))
+    part = np.ones((len(starts.row), 1)) * np.array([[1.0, 0.0, 0.0]])
+    drawn = luck_of_chance(name, parameters, part, prepared, 4000)
+    expected = np.sqrt((3.0 / rate - 1.0) / len(part))
+    assert np.mean(drawn) == pytest.approx(1.0, abs=4.0 * expected / 4000**0.5)
+    assert np.std(drawn) == pytest.approx(expected, rel=0.2)
+    few = luck_of_chance(name, parameters, part, prepared._replace(frames=SimpleNamespace(poses=40)), 4000)
+    assert np.std(few) > 1.1 * np.std(drawn)
+
+
+def test_slip_that_foretells_more_than_there_is_is_taken_back():
+    law, _ = LAWS["slipping"]
+    model, prepared = driven(law)
+    assert slip_seen(model, prepared, law) == 1.0
+    tripled = less_slip(law, 9.0)
+    factor = slip_seen(dataclasses.replace(model, noise=noise_of(tripled)), prepared, tripled)
+    assert factor == pytest.approx(1.0 / 9.0, rel=0.4)
+    assert slip_seen(model, prepared, LAWS["white"][0]) == 1.0
 
 
 def test_a_law_that_is_hardly_known_widens_the_floor():

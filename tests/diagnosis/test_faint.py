@@ -72,7 +72,7 @@ def test_a_window_whose_start_would_jump_does_not_stop_the_others(plain):
     asked[:, 0] = 3.0
     asked[:, 1] *= 4.0
     asked[4, 2] = 1e200
-    found, cost = best_starts(data, nominal.vector, nominal.starts - 0.05, asked)
+    found, _cost = best_starts(data, nominal.vector, nominal.starts - 0.05, asked)
     np.testing.assert_allclose(found[:, [0, 2]], nominal.starts[:, [0, 2]] - 0.05)
     np.testing.assert_allclose(np.delete(found, [0, 2], axis=1), np.delete(nominal.starts, [0, 2], axis=1))
 

@@ -43,7 +43,7 @@ def made_up(verdict: str, *, given: bool = False) -> Diagnosis:
     errors = np.stack([level * np.random.default_rng(4).chisquare(3, (COUNT, 3)) / 3.0 for level in levels])
     errors = errors * (np.array([1.5, 0.3, 1.2]) if gap else 1.0)
     parts = (np.full((COUNT, 3), part) * UNIT for part in (1.0, 0.05, 0.0))
-    floor = Floor(*parts, {}, np.linspace(0.8, 1.3, 400), np.linspace(0.8, 1.3, 400))
+    floor = Floor(*parts, {}, *[np.linspace(0.8, 1.3, 400)] * 2, {}, np.linspace(0.8, 1.3, 400))
     placebo = ("camera_scale", shrinks["camera_scale"])
     model = Model(0.05, Physical(np.array([2.0, 3.0]), np.ones((2, 2)), np.zeros(2)), np.array([0.1, 0.1]))
     return Diagnosis(
@@ -53,7 +53,7 @@ def made_up(verdict: str, *, given: bool = False) -> Diagnosis:
         [Parameter(n, 2.0 if given else None, 2.0 + 0.1 * k, 0.06) for k, n in enumerate(NOMINAL)],
         {name: 1.7**k / 10.0 for k, name in enumerate(reversed(COORDINATES))},
         REPLAY, "Record a longer <run> & more.",
-        model, _with_effects(model, selected), shrinks, Prepared(_NOTHING, LARGEST, _NOTHING, _NOTHING, 30, 1.0,
+        model, _with_effects(model, selected), shrinks, Prepared(_NOTHING, LARGEST, *[_NOTHING] * 4, 30, 1.0,
         Frames(_NOTHING, _NOTHING), _NOTHING, _LAW), _finding(selected, gap, verdict),
     )  # fmt: skip
 

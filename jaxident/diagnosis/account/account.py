@@ -82,18 +82,18 @@ def account_of(
     squares = {joined: error[kept] ** 2 for joined, error in errors.items()}
     total, left = squares[frozenset()], squares[frozenset(players)]
     parts = {CAMERA: floor.camera[kept], START: floor.start[kept], SLIP: floor.slip[kept]}
-    chance = {name: part[kept] for name, part in floor.chance.items()}
     named = shapley(players, lambda joined: squares[joined])
-    for name in dict.fromkeys((*players, *chance)):
-        parts[name] = named.get(name, 0.0) + chance.get(name, 0.0)
+    for name in dict.fromkeys((*players, *floor.chance)):
+        parts[name] = named.get(name, np.zeros_like(total))
     parts[DISCOVERED] = np.zeros_like(total)
     parts[REST] = left - floor.total[kept]
-    rows = _rows(parts, total, unit, floor, seed) if kept.any() else []
+    rows = _rows(parts, total, unit, floor, kept, seed) if kept.any() else []
     return Account(horizon, int(kept.sum()), int(np.sum(~kept)), rows)
 
 
-def _rows(parts: dict[str, Array], total: Array, unit: Array, floor: Floor, seed: int) -> list[Row]:
-    """One row per part; intervals by resampled starts, and by laws of noise as likely as the one chosen."""
+def _rows(parts: dict[str, Array], total: Array, unit: Array, floor: Floor, kept: Array, seed: int) -> list[Row]:
+    """One row per part; intervals by resampled starts, by laws of noise as likely as the one chosen, and by what chance
+    may have done."""
     picks = blocks(np.random.default_rng(seed), len(total), len(floor.draws))
     whole, drawn = np.mean(total / unit), np.mean(total / unit, axis=1)[picks].mean(axis=1)
     slipping = floor.draws - floor.steady
@@ -101,7 +101,9 @@ def _rows(parts: dict[str, Array], total: Array, unit: Array, floor: Floor, seed
     for name, part in parts.items():
         mean = np.mean(part, axis=0)
         spread = np.mean(part / unit, axis=1)[picks].mean(axis=1)
-        if name == REST:
+        if name in floor.chance:
+            mean, spread = mean + np.mean(floor.chance[name][kept], axis=0), spread + floor.lucky[name]
+        elif name == REST:
             spread = spread - (floor.draws - np.mean(floor.draws))
         elif name in (CAMERA, START):
             spread = spread * floor.steady / float(np.mean(floor.steady))

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.diagnosis.account.judging import CHANNELS, Judged, into_channels, judge_model
+from jaxident.diagnosis.account.luck import luck, luck_of_chance
 from jaxident.diagnosis.noise.doubt import Draws
 from jaxident.diagnosis.noise.law import Law, deviations
 from jaxident.diagnosis.prepare import Prepared
@@ -31,7 +32,8 @@ LATE = 4
 class Floor(NamedTuple):
     """Expected squares (starts, 3) [m^2, m^2, rad^2] by camera, start state and slip, and by each effect of chance; and
     the mean over starts and channels of their sum over the camera's variances for laws as likely as the one chosen
-    (draws,); `steady`: the same for a camera alone, as if nothing slipped."""
+    (draws,); `steady`: the same for a camera alone, as if nothing slipped; `likely`: what these laws happen to leave on
+    just these starts, and `lucky` what each effect of chance does."""
 
     camera: Any
     start: Any
@@ -39,6 +41,8 @@ class Floor(NamedTuple):
     chance: dict[str, Any]
     draws: Any
     steady: Any
+    lucky: dict[str, Any]
+    likely: Any
 
     @property
     def total(self) -> np.ndarray:
@@ -53,7 +57,7 @@ def floor_of(model: Model, judged: Judged, prepared: Prepared, law: Law, draws: 
     unit, shape = deviations(law) ** 2, judged.error.shape
     white = np.array([law.position, law.position, law.heading]) ** 2
     camera = np.broadcast_to(white if "coloured_noise" in named else unit, shape)
-    start, slip, chance = judged.start, judged.slip, _in_the_camera(named, judged, prepared)
+    (start, slip), chance = judged.squares, _in_the_camera(named, judged, prepared)
     if "coloured_noise" in named:
         chance["coloured_noise"] = np.broadcast_to(unit - white, shape)
     random = sum(float(np.mean(part / unit)) for part in chance.values())
@@ -61,9 +65,16 @@ def floor_of(model: Model, judged: Judged, prepared: Prepared, law: Law, draws: 
     if LOST in named:  # jolts count as slip in a filter
         kept = tuple(effect for effect in plain.effects if effect.name != LOST)
         without = judge_model(dataclasses.replace(plain, effects=kept), prepared)
-        chance[LOST] = np.maximum(slip - without.slip, 0.0)
+        chance[LOST] = np.maximum(slip - without.squares[1], 0.0)
         slip = slip - chance[LOST]
-    return Floor(camera, start, slip, chance, found + random, steady + random)
+        judged = judged._replace(slip=without.slip)
+    lucky = {
+        name: np.mean(part / unit) * luck_of_chance(name, named[name], part / unit, prepared, len(found))
+        for name, part in chance.items()
+    }
+    calm = found - float(np.mean(chance[LOST] / unit)) if LOST in chance else found
+    likely = calm * luck(judged, camera, unit, len(found)) + sum(lucky.values())
+    return Floor(camera, start, slip, chance, found + random, steady + random, lucky, likely)
 
 
 def _spread(
@@ -72,7 +83,7 @@ def _spread(
     """Means (draws,) over the camera's variances of what camera, start and slip leave, and of what the camera alone
     does, for each law drawn; camera: its own part as chosen."""
     unit, count = deviations(law) ** 2, draws.deviations.shape[1]
-    whole, larger = np.mean(judged.start + judged.slip, axis=0), _variances(model, prepared, law, 1.0 + LARGER)
+    whole, larger = np.mean(sum(judged.squares), axis=0), _variances(model, prepared, law, 1.0 + LARGER)
     by_camera = np.clip((larger - whole) / LARGER / np.maximum(whole, 1e-300), 0.0, 1.0)
     found, steady = np.zeros(count), np.zeros(count)
     for here in _by_memory(draws):
@@ -109,7 +120,7 @@ def _variances(model: Model, prepared: Prepared, law: Law, scale: float = 1.0) -
     larger = {key: root * getattr(noise, key) for key in camera if getattr(noise, key) is not None}
     noise = noise._replace(**larger)
     judged = judge_model(dataclasses.replace(model, noise=noise), prepared)
-    return np.mean(judged.start + judged.slip, axis=0)
+    return np.mean(sum(judged.squares), axis=0)
 
 
 def _in_the_camera(named: dict, judged: Judged, prepared: Prepared) -> dict[str, np.ndarray]:

@@ -17,8 +17,8 @@ class Judged(NamedTuple):
     """One model at the horizon of every judging start, along, lateral [m] and in heading [rad] as the measured heading
     there sees it.
 
-    error (starts, 3): measured less predicted, NaN where the prediction is not finite; start, slip (starts, 3):
-    expected squares by what is not known of the start state, and by slip since; slopes (directions, starts, 3): a
+    error (starts, 3): measured less predicted, NaN where the prediction is not finite; start, slip (starts, 3, 3):
+    covariance by what is not known of the start state, and by slip since; slopes (directions, starts, 3): a
     deviation's worth of each independent direction of the model's parameters; path (starts, rows, 3): predicted poses;
     run_up (starts,): starts where the filter did not converge.
     """
@@ -30,6 +30,11 @@ class Judged(NamedTuple):
     path: Any
     run_up: Any
 
+    @property
+    def squares(self) -> tuple[np.ndarray, np.ndarray]:
+        """Expected squares (starts, 3) by the start state, and by slip."""
+        return np.diagonal(self.start, axis1=1, axis2=2), np.diagonal(self.slip, axis1=1, axis2=2)
+
 
 def judge_model(model: Model, prepared: Prepared) -> Judged:
     """The model's predictions against the poses measured at the horizon."""
@@ -39,10 +44,7 @@ def judge_model(model: Model, prepared: Prepared) -> Judged:
     error = measured - ahead.pose[:, -1]
     error[:, 2] = (error[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
     turn = into_channels(measured[:, 2])
-    start, slip = (
-        np.diagonal(turn @ part[:, -1] @ turn.transpose(0, 2, 1), axis1=1, axis2=2)
-        for part in (ahead.start, ahead.slip)
-    )
+    start, slip = (turn @ part[:, -1] @ turn.transpose(0, 2, 1) for part in (ahead.start, ahead.slip))
     slopes = np.einsum("sij,dsj->dsi", turn, ahead.parameters[:, :, -1])
     return Judged((turn @ error[..., None])[..., 0], start, slip, slopes, ahead.pose, ahead.run_up)
 

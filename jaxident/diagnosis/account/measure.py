@@ -10,14 +10,15 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.account.account import Account, account_of
 from jaxident.diagnosis.account.floor import Floor, floor_of
 from jaxident.diagnosis.account.judging import Judged, judge_model
-from jaxident.diagnosis.account.models import corrected_of, players_of, single, with_players, without
+from jaxident.diagnosis.account.models import Corrected, corrected_of, players_of, single, with_players, without
 from jaxident.diagnosis.account.shrink import HIGH, LOW, Shrink, interval, shrink_of
+from jaxident.diagnosis.account.slip_check import slip_seen
 from jaxident.diagnosis.account.where import Place, increments, locate
 from jaxident.diagnosis.causes.candidates import Finding
 from jaxident.diagnosis.causes.unexplained import UNEXPLAINED
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.noise.doubt import Draws, draw_laws, sizes_by_memory
-from jaxident.diagnosis.noise.law import Law, deviations
+from jaxident.diagnosis.noise.law import Law, deviations, less_slip
 from jaxident.diagnosis.noise.sizing import Sized, sample
 from jaxident.diagnosis.prepare import Prepared
 from jaxident.robot.model import Model
@@ -70,7 +71,7 @@ class Gap(NamedTuple):
         """The corrected model's error, at the low end of its interval, over the high end of what noise makes."""
         errors = np.asarray(self.errors[2])
         seen = np.isfinite(errors).all(axis=1).any()
-        return interval(errors)[0] / max(self.floor_interval[1], 1e-9) if seen else 0.0
+        return interval(errors)[0] / max(float(np.quantile(self.noise.draws, HIGH)), 1e-9) if seen else 0.0
 
 
 def _root(squares: Array) -> float:
@@ -91,8 +92,8 @@ class Measured(NamedTuple):
 def measure(prepared: Prepared, finding: Finding, given: Model | None, common, direct: dict, seed: int = 0) -> Measured:
     """The gap before and after, the account, where it lies, and the shrink of each single effect; `given` is the model
     as given, `common` are effects that it has already, `direct` parameters of effects that show without a refit."""
-    law, draws = _laws(finding, seed)
-    corrected = corrected_of(prepared, finding, law, direct)
+    corrected, draws = _corrected(prepared, finding, direct, seed)
+    law = corrected.law
     bare = dataclasses.replace(corrected.model, covariance=None, parameter_order=())
     players = players_of(corrected, common)
     judged: dict[frozenset[str], Judged] = {
@@ -119,7 +120,7 @@ def measure(prepared: Prepared, finding: Finding, given: Model | None, common, d
     placebo = (alone[-1].effects[0], shrinks[alone[-1].effects[0]]) if alone else None
     kept = np.isfinite(errors).all(axis=(0, 2))
     given_level, refitted, after = (float(np.mean(own[kept])) if kept.any() else float("nan") for own in errors)
-    low, high = (float(q) for q in np.quantile(floor.draws, [LOW, HIGH]))
+    low, high = (float(q) for q in np.quantile(floor.likely, [LOW, HIGH]))
     gap = Gap(prepared.horizon, given_level, refitted, after, level, (low, high), shrink(everybody), placebo, errors,
               floor, unit, int(everybody.run_up.sum()))  # fmt: skip
     moved = None
@@ -127,6 +128,16 @@ def measure(prepared: Prepared, finding: Finding, given: Model | None, common, d
         moved = _moved(everybody, judge_model(without(bare, players), prepared), unit)
     place = locate(errors[1], floor.total / unit, everybody.path, prepared, moved, seed)
     return Measured(gap, account, place, shrinks, corrected.model)
+
+
+def _corrected(prepared: Prepared, finding: Finding, direct: dict, seed: int) -> tuple[Corrected, Draws]:
+    """The corrected model, and draws of noise laws as likely as its own, with no more slip than it leaves room for."""
+    law, draws = _laws(finding, seed)
+    corrected = corrected_of(prepared, finding, law, direct)
+    factor = slip_seen(corrected.model, prepared, law)
+    if factor == 1.0:
+        return corrected, draws
+    return corrected_of(prepared, finding, less_slip(law, factor), direct), draws.less_slip(factor)
 
 
 def _laws(finding: Finding, seed: int) -> tuple[Law, Draws]:

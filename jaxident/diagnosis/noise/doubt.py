@@ -27,11 +27,11 @@ class Draws(NamedTuple):
     slip_time: Array | None
     coloured_time: float | None
 
-    def without_slip(self) -> "Draws":
-        """The same laws, their slip left out."""
-        if self.slip_time is None:
-            return self
-        return Draws(np.delete(self.deviations, [2, 3], axis=0), None, self.coloured_time)
+    def less_slip(self, factor: float) -> "Draws":
+        """The same laws with a part of their slip's variances."""
+        deviations = np.array(self.deviations)
+        deviations[2:4] *= factor**0.5
+        return self._replace(deviations=deviations)
 
 
 def sizes_by_memory(law: Law, given: Sample) -> list[Sized]:

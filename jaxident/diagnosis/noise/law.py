@@ -35,6 +35,11 @@ def _powers(law: Law) -> list[float]:
     return [law.position**2, law.heading**2, *slow, *(deviation**2 for deviation in coloured)]
 
 
+def less_slip(law: Law, factor: float) -> Law:
+    """The law with a part of its slip's variances."""
+    return law if law.slip is None else law._replace(slip=tuple(d * factor**0.5 for d in law.slip))
+
+
 def first_law(windows: Windows) -> Law:
     """Camera error by fourth differences of the poses, which motion hardly enters; the median forgives switches."""
     pose, seen = np.asarray(windows.pose), np.asarray(windows.seen)

@@ -76,7 +76,8 @@ def law_of(noise: Noise, period: float) -> Law:
     time = noise.slip_time
     scale = np.sqrt(period if time is None else 2.0 * time)
     return Law(
-        *white.tolist(),
+        float(white[0]),
+        float(white[1]),
         slip=(slip[0] / scale, slip[1] / scale) if any(slip) else None,
         slip_time=(1e-3 * period if time is None else float(time)) if any(slip) else None,
         coloured=None if memory is None else (float(memory[0]), float(memory[1])),
