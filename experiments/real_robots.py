@@ -4,15 +4,17 @@
 
 Five iRobot Create robots (UTIAS MRCLAM dataset 6, Leung et al. 2011; motion capture): identified on the first half of
 each log, predicted 10 s ahead on the second. A Husky (norlab-ulaval DRIVE; lidar): identified on 400 of its windows,
-predicted 1 s ahead on the other 203. The paper's method; maximum likelihood under the noise law that it finds; and a
+predicted 1 s ahead on the other 203. The paper's method; maximum likelihood under the noise law that it finds; the
+nominal and the corrected model of `jaxident diagnose` on the same rows (with `--diagnose`, some minutes a robot); and a
 robot that does what it is told: the last measured pose, moved on with the commanded speeds. One picture per robot, of
-maximum likelihood, and a table: errors as medians and root mean squares over the starts.
+the last model, and a table: errors as medians and root mean squares over the starts.
 """
 
 import argparse
 import json
 import pathlib
 import time
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -20,6 +22,7 @@ import jaxident as ji
 from jaxident.estimation.predict import prediction_error
 from jaxident.files.streams import merge, read_commands, read_poses
 from jaxident.log import Log, between, join
+from jaxident.robot.model import Model
 
 CREATE_TRACK = 0.258
 PERIOD = 0.05
@@ -47,17 +50,28 @@ def commanded(log: Log, prediction, track: float, wheel: float = 1.0):
     return prediction._replace(**columns)
 
 
-def judge(name: str, known: Log, unseen: Log, horizon: int, burn_in: int, baseline, out: pathlib.Path) -> list[dict]:
-    """Identify on one part, predict the other, draw, and return the rows of the table."""
-    rows = []
+def models(known: Log, diagnosed: bool) -> Iterator[tuple[str, bool, Model]]:
+    """Models that each method makes of a log, and whether it says that it succeeded."""
     for method in METHODS:
-        begin = time.monotonic()
         found = ji.identify(known, method)
-        prediction = ji.predict(found.model, unseen, horizon, burn_in=burn_in)
-        seconds, noise = time.monotonic() - begin, found.model.noise._asdict() if found.model.noise else {}
+        yield method, bool(found.ok), found.model
+    if diagnosed:
+        gap = ji.diagnose(known)
+        yield "diagnose, nominal", True, gap.nominal_model
+        yield f"diagnose, corrected ({', '.join(e.name for e in gap.corrected_model.effects)})", True, gap.corrected_model
+
+
+def judge(
+    name: str, known: Log, unseen: Log, horizon: int, burn_in: int, baseline, out: pathlib.Path, diagnosed: bool
+) -> list[dict]:
+    """Identify on one part, predict the other, draw, and return the rows of the table."""
+    rows, begin = [], time.monotonic()
+    for method, ok, model in models(known, diagnosed):
+        prediction = ji.predict(model, unseen, horizon, burn_in=burn_in)
+        seconds, noise = time.monotonic() - begin, model.noise._asdict() if model.noise else {}
         error = prediction_error(prediction, unseen)
-        rows.append({"robot": name, "method": method, "ok": bool(found.ok), "took": seconds, **error, **noise})
-    # The picture is that of the last method: maximum likelihood.
+        rows.append({"robot": name, "method": method, "ok": ok, "took": seconds, **error, **noise})
+        begin = time.monotonic()
     draw(name, unseen, prediction, f"{error['position_median']:.2g} m off after {error['seconds']:.2g} s (median)", out)
     rows.append({"robot": name, "method": "commanded", **prediction_error(baseline(unseen, prediction), unseen)})
     for row in rows:
@@ -79,7 +93,7 @@ def draw(name: str, log: Log, prediction, verdict: str, out: pathlib.Path) -> No
     ji.plot.save(figure, out / f"{name}.png")
 
 
-def creates(data: pathlib.Path, robots: list[int], out: pathlib.Path) -> list[dict]:
+def creates(data: pathlib.Path, robots: list[int], out: pathlib.Path, diagnosed: bool) -> list[dict]:
     """The five Creates, each on its own halves."""
     rows = []
     for robot in robots:
@@ -88,16 +102,16 @@ def creates(data: pathlib.Path, robots: list[int], out: pathlib.Path) -> list[di
         log = merge(*streams, track=CREATE_TRACK, period=PERIOD)
         middle = float(log.t[0] + log.t[-1]) / 2
         halves = between(log, None, middle), between(log, middle, None)
-        rows += judge(f"create_{robot}", *halves, 200, 20, lambda u, p: commanded(u, p, CREATE_TRACK), out)
+        rows += judge(f"create_{robot}", *halves, 200, 20, lambda u, p: commanded(u, p, CREATE_TRACK), out, diagnosed)
     return rows
 
 
-def husky(data: pathlib.Path, out: pathlib.Path) -> list[dict]:
+def husky(data: pathlib.Path, out: pathlib.Path, diagnosed: bool) -> list[dict]:
     """The Husky: whole windows for identification, others for prediction."""
     runs = ji.read_log(data / "drive_husky" / "husky.csv.gz").runs()
     known = join([run for k, run in enumerate(runs) if k % 3])
     unseen = join([run for k, run in enumerate(runs) if not k % 3])
-    return judge("husky", known, unseen, 20, 19, lambda u, p: commanded(u, p, HUSKY_TRACK, HUSKY_WHEEL), out)
+    return judge("husky", known, unseen, 20, 19, lambda u, p: commanded(u, p, HUSKY_TRACK, HUSKY_WHEEL), out, diagnosed)
 
 
 def table(rows: list[dict]) -> str:
@@ -123,9 +137,11 @@ def main() -> None:
     parser.add_argument("--data", type=pathlib.Path, required=True)
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("real_robots"))
     parser.add_argument("--robots", type=int, nargs="*", default=[1, 2, 3, 4, 5])
+    parser.add_argument("--diagnose", action="store_true", help="the models of a diagnosis as well")
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
-    rows = [*creates(options.data, options.robots, options.out), *husky(options.data, options.out)]
+    rows = creates(options.data, options.robots, options.out, options.diagnose)
+    rows += husky(options.data, options.out, options.diagnose)
     (options.out / "table.json").write_text(json.dumps(rows, indent=2) + "\n")
     (options.out / "table.md").write_text(table(rows))
 

@@ -50,7 +50,7 @@ def _gap(found: dict[str, dict]) -> Section:
     ]  # fmt: skip
     table = Table(("robot", *MODELS.values(), "floor", "shrink (90 % interval)"), rows,
                   "Mean squared errors on stretches that took part in no fit, in camera variances.")  # fmt: skip
-    picture = Figure(plot.image(figure), "Errors of the models on each robot", "Black bars: the floor by replay.")
+    picture = Figure(plot.image(figure), "Errors of the models on each robot", "Black bars: what noise makes.")
     return Section("How large the gap is", [picture, table])
 
 
