@@ -95,6 +95,16 @@ def test_what_the_corrector_explains_as_well_makes_a_further_effect_doubtful():
         assert found.sets[0][1] > 0.8
 
 
+def test_a_set_that_stays_in_spite_of_what_is_left_keeps_its_names():
+    """A term of 400 is left, which could take up what the second effect brings; no smaller set would leave less, so
+    that both are in the corrected model: then both are told, and the rest apart."""
+    pair, term = ("turn_loss", "transport_delay"), Term("contact", "v w in the speed sideways")
+    found = judge(finding({pair[:1]: 900.0, pair: 1200.0}, pair, [(term, 400.0)]), GAP, NONE)
+    assert {cause.effect for cause in found.causes} == set(pair)
+    assert min(cause.probability for cause in found.causes) > 0.99
+    assert found.unexplained > 0.5
+
+
 def test_frames_that_lie_are_an_effect_by_themselves():
     found = judge(finding({}, ()), GAP, {"frozen_frames": 300.0})
     assert found.none < 0.01

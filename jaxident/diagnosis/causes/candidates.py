@@ -82,6 +82,13 @@ class Finding(NamedTuple):
         return max(ENOUGH, TERMS * largest(self.terms))
 
     @property
+    def price(self) -> float:
+        """What an effect beside others was asked for when the set was selected: `further`, or ENOUGH where the set
+        stays in spite of what is left. Its probability is told by the same price."""
+        best = max(self.candidates.values(), key=lambda candidate: value(candidate, self.further))
+        return self.further if best.effects == self.selected else ENOUGH
+
+    @property
     def rest(self) -> float:
         """Fall of -log p that all terms bring beyond the selected set."""
         return sum(gain for _, gain in self.terms)
