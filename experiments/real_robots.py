@@ -57,8 +57,9 @@ def models(known: Log, diagnosed: bool) -> Iterator[tuple[str, bool, Model]]:
         yield method, bool(found.ok), found.model
     if diagnosed:
         gap = ji.diagnose(known)
+        names = ", ".join(effect.name for effect in gap.corrected_model.effects)
         yield "diagnose, nominal", True, gap.nominal_model
-        yield f"diagnose, corrected ({', '.join(e.name for e in gap.corrected_model.effects)})", True, gap.corrected_model
+        yield f"diagnose, corrected ({names})", True, gap.corrected_model
 
 
 def judge(

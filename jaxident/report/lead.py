@@ -49,10 +49,18 @@ def _named(found: Diagnosis) -> str:
     many = f"{COUNTS.get(len(found.selected), 'several')} unmodelled effects"
     count = "one unmodelled effect" if len(found.selected) == 1 else many
     begin = "The gap comes from" if found.verdict == "effects" else "A part of the gap comes from"
-    shares = {row.part: row.share for row in found.account.rows}
-    told = [f"{percent(shares[name])} is due to {plain(name)}" for name in found.selected if name in shares]
+    return f"{begin} {count}: {_in_words(found)}. {_size(found)}{_due(found)}"
+
+
+def _due(found: Diagnosis) -> str:
+    """The part of the error that each selected effect makes, and those that take none of it away."""
+    own = [(plain(row.part), row.share) for row in found.account.rows if row.part in found.selected]
+    told = [f"{percent(share)} is due to {name}" for name, share in own if share > 0.0]
+    idle = [name for name, share in own if share <= 0.0]
     due = f" Of the mean squared error {_listed(told)}." if told else ""
-    return f"{begin} {count}: {_in_words(found)}. {_size(found)}{due}"
+    if not idle:
+        return due
+    return f"{due} On the runs kept for judging {_listed(idle)} {'take' if len(idle) > 1 else 'takes'} nothing away."
 
 
 def _in_words(found: Diagnosis) -> str:

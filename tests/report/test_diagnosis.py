@@ -61,6 +61,13 @@ def test_lead_tells_sizes_shares_and_look_alikes():
     assert told.endswith("This input cannot tell transport delay from motor lag.")
 
 
+def test_lead_does_not_call_a_negative_share_a_cause():
+    found = made_up("effects")
+    rows = [row._replace(share=-0.2) if row.part == "quadratic_drag" else row for row in found.account.rows]
+    told = plain_spaces(lead(found._replace(account=found.account._replace(rows=rows))))
+    assert "is due to transport delay. On the runs kept for judging quadratic drag takes nothing away." in told
+
+
 def test_lead_tells_a_rest_beside_a_name():
     told = plain_spaces(lead(made_up("partly")))
     assert "Something else takes part that no named effect covers" in told
