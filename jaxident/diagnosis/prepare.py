@@ -2,13 +2,11 @@
 
 from typing import Any, NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.lost import Lost
-from jaxident.diagnosis.causes.search import Data, Solution, refit
+from jaxident.diagnosis.causes.search import Solution
 from jaxident.diagnosis.frames import (
     Frames,
     find_more_outliers,
@@ -17,20 +15,17 @@ from jaxident.diagnosis.frames import (
     frames_of,
     has_outliers,
 )
-from jaxident.diagnosis.motion.linear import START_STATES
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.motion.windows import Piece, Windows, cut, take
-from jaxident.diagnosis.noise.law import Law, first_law, white_whitener
+from jaxident.diagnosis.noise.law import Law, first_law
 from jaxident.diagnosis.noise.sizing import size_noise
+from jaxident.diagnosis.nominal import better_valley, rough_fit, starting_point
 from jaxident.diagnosis.roles import split
-from jaxident.effects.coordinates import neutral_vector, nominal_vector
+from jaxident.effects.coordinates import neutral_vector
 from jaxident.errors import InputError
 from jaxident.estimation.checks import check_informative
-from jaxident.estimation.maximum_likelihood import begin
-from jaxident.estimation.runs import stack_runs
 from jaxident.estimation.stretches import Starts
 from jaxident.log import Log, blind, join, run_begins
-from jaxident.robot.drive import Physical
 
 BURN = 20
 """Rows from which a window's start state is estimated before the horizon begins."""
@@ -104,9 +99,17 @@ def prepare(
     if law is not None:
         return found
     outlying, windows, first = without_outliers(fitted, windows, first, pieces)
-    responses = respond(np.exp(first.vector[:2]), first.linear.residual, windows)
-    law = size_noise(first.linear.residual, first.linear.starts, windows, responses)
+    law = _sized(first, windows)
+    other = better_valley(first, windows, law)
+    if other is not None:
+        first, law = other, _sized(other, windows)
     return found._replace(windows=windows, frames=frames_of(fitted, frozen, outlying), nominal=first, law=law)
+
+
+def _sized(fit: Solution, windows: Windows) -> Law:
+    """The noise law of what a nominal fit leaves."""
+    responses = respond(np.exp(fit.vector[:2]), fit.linear.residual, windows)
+    return size_noise(fit.linear.residual, fit.linear.starts, windows, responses)
 
 
 def repaired(prepared: Prepared, lost: Lost, worth: float) -> Prepared:
@@ -156,41 +159,6 @@ def judging_starts(log: Log, pieces: list[Piece], rows: int) -> Starts:
         ]
     starts = np.array(found, int).reshape(-1, 2)
     return Starts(starts[:, 0], starts[:, 1])
-
-
-def starting_point(log: Log, pieces: list[Piece]) -> np.ndarray:
-    """The nominal coordinates (10,) that the starter of the likelihood finds in some pieces."""
-    runs = log.runs()
-    own = join([runs[piece.run].rows(piece.first, piece.last) for piece in pieces])
-    found = begin(jax.tree.map(jnp.asarray, stack_runs(own)), jnp.asarray(0.9)).estimate
-    drive = Physical(np.asarray(found.rate), np.asarray(found.gain))
-    point = nominal_vector(drive, np.asarray(found.dead_zone))
-    if not np.all(np.isfinite(point)) or abs(np.linalg.det(np.asarray(found.gain))) < 1e-9:
-        raise InputError("the log does not determine a nominal model: drive both wheels, at several levels")
-    return point
-
-
-def rough_fit(windows: Windows, vector: Array, law: Law | None = None) -> Solution:
-    """The nominal fit for white camera noise, of a law or as fourth differences size it."""
-    law = first_law(windows) if law is None else law
-    return refit(Data(windows, white_whitener(law, windows)), vector, first_starts(windows), (), most=6)
-
-
-def first_starts(windows: Windows) -> np.ndarray:
-    """Start states (5, windows) from the first poses seen in each window."""
-    pose, seen = np.asarray(windows.pose), np.asarray(windows.seen)
-    starts = np.zeros((START_STATES, pose.shape[1]))
-    time = np.cumsum(windows.step, axis=0) - windows.step
-    for window in range(pose.shape[1]):
-        rows = np.flatnonzero(seen[:, window])[:8]
-        x, y, theta = pose[rows, window].T
-        theta = np.unwrap(theta)
-        passed = time[rows[-1], window] - time[rows[0], window]
-        middle = theta[len(rows) // 2]
-        v = ((x[-1] - x[0]) * np.cos(middle) + (y[-1] - y[0]) * np.sin(middle)) / passed
-        w = (theta[-1] - theta[0]) / passed
-        starts[:, window] = x[0], y[0], theta[0], v, w
-    return starts
 
 
 def stretches(log: Log, rows: int, pieces: list[Piece]) -> Windows:

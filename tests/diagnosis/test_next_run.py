@@ -11,10 +11,10 @@ from jaxident.diagnosis.causes.search import Data, refit
 from jaxident.diagnosis.motion.linear import follow
 from jaxident.diagnosis.motion.windows import cut, uncut
 from jaxident.diagnosis.noise.law import Law, whitener_of
+from jaxident.diagnosis.nominal import first_starts
 from jaxident.diagnosis.planning import next_run, question
 from jaxident.diagnosis.planning.next_run import plan, separations
 from jaxident.diagnosis.planning.trial_inputs import KINDS, make, vary
-from jaxident.diagnosis.prepare import first_starts
 from jaxident.effects.apply import with_effects
 from jaxident.effects.coordinates import neutral_vector, nominal_vector
 from jaxident.effects.simulate import simulate

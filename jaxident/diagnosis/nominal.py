@@ -1,0 +1,94 @@
+"""The nominal fit that a search for effects begins from.
+
+Where an effect is large, the first fit under white noise may end in a wrong valley. On half a log of a Create, whose
+speed falls by 40 % in turns, the starter called the robot one that hardly answers its commands, and no later step left
+that valley. So a second fit begins at a robot that follows its commands, under noise that has slip.
+"""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxident.array_types import Array
+from jaxident.diagnosis.causes.search import Data, Solution, refit
+from jaxident.diagnosis.motion.linear import START_STATES
+from jaxident.diagnosis.motion.responses import respond
+from jaxident.diagnosis.motion.windows import Piece, Windows
+from jaxident.diagnosis.noise.law import Law, first_law, white_whitener, whitener_of
+from jaxident.effects.coordinates import neutral_vector, nominal_vector
+from jaxident.errors import InputError
+from jaxident.estimation.maximum_likelihood import begin
+from jaxident.estimation.runs import stack_runs
+from jaxident.log import Log, join
+from jaxident.robot.drive import Physical
+
+SETTLES = 4.0
+"""Time constants within a window of the robot that follows its commands: it has settled at the end of one."""
+STEPS = 60
+"""Of each of the two fits: on that half log the second needs 38."""
+BETTER = 1.0
+"""Fall of -log p beyond which another valley is taken: less is how exactly refits arrive."""
+
+
+def starting_point(log: Log, pieces: list[Piece]) -> np.ndarray:
+    """The nominal coordinates (10,) that the starter of the likelihood finds in some pieces."""
+    runs = log.runs()
+    own = join([runs[piece.run].rows(piece.first, piece.last) for piece in pieces])
+    found = begin(jax.tree.map(jnp.asarray, stack_runs(own)), jnp.asarray(0.9)).estimate
+    drive = Physical(np.asarray(found.rate), np.asarray(found.gain))
+    point = nominal_vector(drive, np.asarray(found.dead_zone))
+    if not np.all(np.isfinite(point)) or abs(np.linalg.det(np.asarray(found.gain))) < 1e-9:
+        raise InputError("the log does not determine a nominal model: drive both wheels, at several levels")
+    return point
+
+
+def rough_fit(windows: Windows, vector: Array, law: Law | None = None) -> Solution:
+    """The nominal fit for white camera noise, of a law or as fourth differences size it."""
+    law = first_law(windows) if law is None else law
+    return refit(Data(windows, white_whitener(law, windows)), vector, first_starts(windows), (), most=6)
+
+
+def steady_point(windows: Windows) -> np.ndarray:
+    """The nominal coordinates (10,) of a robot whose steady speeds answer the commands as the windows' mean speeds do,
+    without dead zones."""
+    speeds, commands = [], []
+    for window in range(len(windows.run)):
+        rows = np.flatnonzero(windows.seen[:, window])
+        x, y, theta = windows.pose[rows, window].T
+        theta, inside = np.unwrap(theta), slice(rows[0], rows[-1])
+        middle = 0.5 * (theta[1:] + theta[:-1])
+        along = np.sum(np.diff(x) * np.cos(middle) + np.diff(y) * np.sin(middle))
+        step = windows.step[inside, window]
+        sent = windows.command[windows.first[window] :, windows.run[window]][inside]
+        speeds.append(np.array([along, theta[-1] - theta[0]]) / step.sum())
+        commands.append(step @ np.nan_to_num(sent) / step.sum())
+    answers = np.linalg.lstsq(np.array(commands), np.array(speeds), rcond=None)[0].T
+    rate = SETTLES / float(np.median(windows.step.sum(axis=0)))
+    return nominal_vector(Physical(np.full(2, rate), rate * answers), np.zeros(2))
+
+
+def better_valley(fit: Solution, windows: Windows, law: Law) -> Solution | None:
+    """The nominal fit under a noise law from a robot that follows its commands, if it ends in a lower valley than from
+    where another fit stands; None if not."""
+    responses = respond(np.exp(fit.vector[:2]), fit.linear.residual, windows)
+    data = Data(windows, whitener_of(law, windows, responses))
+    here = refit(data, fit.vector, fit.starts, (), most=STEPS)
+    other = refit(data, neutral_vector(steady_point(windows)), first_starts(windows), (), most=STEPS)
+    return other if other.cost < here.cost - BETTER else None
+
+
+def first_starts(windows: Windows) -> np.ndarray:
+    """Start states (5, windows) from the first poses seen in each window."""
+    pose, seen = np.asarray(windows.pose), np.asarray(windows.seen)
+    starts = np.zeros((START_STATES, pose.shape[1]))
+    time = np.cumsum(windows.step, axis=0) - windows.step
+    for window in range(pose.shape[1]):
+        rows = np.flatnonzero(seen[:, window])[:8]
+        x, y, theta = pose[rows, window].T
+        theta = np.unwrap(theta)
+        passed = time[rows[-1], window] - time[rows[0], window]
+        middle = theta[len(rows) // 2]
+        v = ((x[-1] - x[0]) * np.cos(middle) + (y[-1] - y[0]) * np.sin(middle)) / passed
+        w = (theta[-1] - theta[0]) / passed
+        starts[:, window] = x[0], y[0], theta[0], v, w
+    return starts
