@@ -32,6 +32,7 @@ from .marks import mark
 from .promise import unit_of
 
 NOISE = ("camera", "start", "slip")
+MEMORY = "coloured_noise"
 
 
 def robots_of(case: dict) -> dict[frozenset[str], list]:
@@ -56,7 +57,7 @@ def law_of(noise: Noise, effects) -> Law:
     slip, time = None, noise.slip_time
     if time is not None:
         slip = tuple(float(d) / np.sqrt(2.0 * time) for d in (noise.slip_along, noise.slip_heading))
-    memory = next((effect.parameters for effect in effects if effect.name == "coloured_noise"), None)
+    memory = next((effect.parameters for effect in effects if effect.name == MEMORY), None)
     if memory is not None:
         coloured = memory["position"], memory["heading"]
         return Law(noise.position, noise.heading, slip, time, coloured, memory["correlation_time"])
@@ -83,8 +84,10 @@ def one(case: dict, folder: pathlib.Path) -> dict:
     """Told and true shares of a case."""
     found = json.loads((folder / "diagnosis.json").read_text())
     corrected = ji.load_model(folder / "corrected_model.json")
-    law, unit = law_of(corrected.noise, corrected.effects), unit_of(corrected)
-    worth = {s: missed(logs, law, found["gap"]["horizon"], unit) for s, logs in robots_of(case).items()}
+    unit, worth = unit_of(corrected), {}
+    for subset, logs in robots_of(case).items():  # a camera without a memory is filtered as one
+        kept = [effect for effect in corrected.effects if effect.name != MEMORY or MEMORY in subset]
+        worth[subset] = missed(logs, law_of(corrected.noise, kept), found["gap"]["horizon"], unit)
     names = tuple(effect["name"] for effect in case["effects"])
     values = shapley(names, lambda joined: -worth[joined])
     whole = worth[frozenset(names)]

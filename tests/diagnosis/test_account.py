@@ -131,6 +131,20 @@ def test_the_floor_is_what_a_true_model_misses_by(kind):
     assert set(floor.chance) == {effect.name for effect in effects}
 
 
+def test_a_memory_of_the_camera_is_told_with_what_it_does_to_starts():
+    """The same robots with and without it: its part is the difference, within the error of both mean squares."""
+    law = Law(5e-4, 4e-3, coloured=(1e-3, 5e-3), coloured_time=0.3)
+    effect = Effect("coloured_noise", {"position": 1e-3, "heading": 5e-3, "correlation_time": 0.3})
+    model, prepared = driven(law, (effect,))
+    judged, unit = judge_model(model, prepared), deviations(law) ** 2
+    floor = floor_of(model, judged, prepared, law, sure(law))
+    calm = judge_model(*driven(Law(5e-4, 4e-3)))
+    missed = [np.mean(one.error**2 / unit) for one in (judged, calm)]
+    assert np.mean(floor.chance["coloured_noise"] / unit) == pytest.approx(missed[0] - missed[1], rel=0.2)
+    assert np.mean(floor.start / unit) == pytest.approx(np.mean(calm.squares[0] / unit), rel=0.1)
+    assert np.mean(judged.squares[0]) > 1.5 * np.mean(calm.squares[0])  # else the test would see no difference
+
+
 def test_what_noise_happens_to_leave_spreads_as_over_seeds():
     """The spread of mean squares over twelve seeds of two runs, 18 starts each, has a standard error of 20 %."""
     law, _ = LAWS["slipping"]

@@ -13,6 +13,7 @@ import numpy as np
 
 from jaxident.diagnosis.account.judging import CHANNELS, Judged, into_channels, judge_model
 from jaxident.diagnosis.account.luck import luck, luck_of_chance
+from jaxident.diagnosis.account.models import LOST, without
 from jaxident.diagnosis.noise.doubt import Draws
 from jaxident.diagnosis.noise.law import Law, deviations
 from jaxident.diagnosis.prepare import Prepared
@@ -24,7 +25,7 @@ LARGER = 0.01
 """Part by which the camera's variances are scaled to see what depends on them."""
 RARE = 0.1
 """Share of all draws below which a memory of slip is not followed by itself."""
-LOST = "lost_commands"
+MEMORY = "coloured_noise"
 LATE = 4
 """Frames in a row that may be repeats of one before: five are too rare to matter."""
 
@@ -56,23 +57,26 @@ def floor_of(model: Model, judged: Judged, prepared: Prepared, law: Law, draws: 
     named = {effect.name: effect.parameters for effect in model.effects}
     unit, shape = deviations(law) ** 2, judged.error.shape
     white = np.array([law.position, law.position, law.heading]) ** 2
-    camera = np.broadcast_to(white if "coloured_noise" in named else unit, shape)
+    camera = np.broadcast_to(white if MEMORY in named else unit, shape)
     (start, slip), chance = judged.squares, _in_the_camera(named, judged, prepared)
-    if "coloured_noise" in named:
-        chance["coloured_noise"] = np.broadcast_to(unit - white, shape)
+    if MEMORY in named:
+        chance[MEMORY] = np.broadcast_to(unit - white, shape)
     random = sum(float(np.mean(part / unit)) for part in chance.values())
     found, steady = _spread(plain, judged, prepared, law, draws, float(np.mean(camera / unit)))
+    moved = {}
     if LOST in named:  # jolts count as slip in a filter
-        kept = tuple(effect for effect in plain.effects if effect.name != LOST)
-        without = judge_model(dataclasses.replace(plain, effects=kept), prepared)
-        chance[LOST] = np.maximum(slip - without.squares[1], 0.0)
-        slip = slip - chance[LOST]
-        judged = judged._replace(slip=without.slip)
+        other = judge_model(without(plain, {LOST}), prepared)
+        moved[LOST] = np.maximum(slip - other.squares[1], 0.0)
+        slip, judged = slip - moved[LOST], judged._replace(slip=other.slip)
+    if MEMORY in named:  # it is in the last poses as well, from which a start is known
+        moved[MEMORY] = np.maximum(start - judge_model(without(plain, {MEMORY}), prepared).squares[0], 0.0)
+        start = start - moved[MEMORY]
+    chance |= {name: chance.get(name, 0.0) + part for name, part in moved.items()}
     lucky = {
         name: np.mean(part / unit) * luck_of_chance(name, named[name], part / unit, prepared, len(found))
         for name, part in chance.items()
     }
-    calm = found - float(np.mean(chance[LOST] / unit)) if LOST in chance else found
+    calm = found - sum(float(np.mean(part / unit)) for part in moved.values())
     likely = calm * luck(judged, camera, unit, len(found)) + sum(lucky.values())
     return Floor(camera, start, slip, chance, found + random, steady + random, lucky, likely)
 
@@ -114,7 +118,7 @@ def _by_memory(draws: Draws) -> list[np.ndarray]:
 
 def _variances(model: Model, prepared: Prepared, law: Law, scale: float = 1.0) -> np.ndarray:
     """Mean expected squares (3,) by start and slip under a law whose camera's variances are scaled."""
-    apart = any(effect.name == "coloured_noise" for effect in model.effects)
+    apart = any(effect.name == MEMORY for effect in model.effects)
     noise, root = noise_of(law, apart), scale**0.5
     camera = ("position", "heading", "white_position", "white_heading")
     larger = {key: root * getattr(noise, key) for key in camera if getattr(noise, key) is not None}
