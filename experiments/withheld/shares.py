@@ -4,7 +4,8 @@
 
 The robot of a case is driven again, same commands, starts and draws, with every subset of its hidden effects. The
 nominal model is refitted to each robot on the runs that fit, and judged on those that judge: w(S). The true share of an
-effect is its Shapley value in w over w of all. What is told of noise (camera, start state and slip together) is held
+effect is its Shapley value in w over w of all. Every robot is filtered by the law of noise that the case's corrected
+model has. What is told of noise (camera, start state and slip together) is held
 against w of none. Cases with the right names count. Answers must be plain.
 """
 
@@ -32,7 +33,6 @@ from .marks import mark
 from .promise import unit_of
 
 NOISE = ("camera", "start", "slip")
-MEMORY = "coloured_noise"
 
 
 def robots_of(case: dict) -> dict[frozenset[str], list]:
@@ -57,7 +57,7 @@ def law_of(noise: Noise, effects) -> Law:
     slip, time = None, noise.slip_time
     if time is not None:
         slip = tuple(float(d) / np.sqrt(2.0 * time) for d in (noise.slip_along, noise.slip_heading))
-    memory = next((effect.parameters for effect in effects if effect.name == MEMORY), None)
+    memory = next((effect.parameters for effect in effects if effect.name == "coloured_noise"), None)
     if memory is not None:
         coloured = memory["position"], memory["heading"]
         return Law(noise.position, noise.heading, slip, time, coloured, memory["correlation_time"])
@@ -84,10 +84,8 @@ def one(case: dict, folder: pathlib.Path) -> dict:
     """Told and true shares of a case."""
     found = json.loads((folder / "diagnosis.json").read_text())
     corrected = ji.load_model(folder / "corrected_model.json")
-    unit, worth = unit_of(corrected), {}
-    for subset, logs in robots_of(case).items():  # a camera without a memory is filtered as one
-        kept = [effect for effect in corrected.effects if effect.name != MEMORY or MEMORY in subset]
-        worth[subset] = missed(logs, law_of(corrected.noise, kept), found["gap"]["horizon"], unit)
+    law, unit = law_of(corrected.noise, corrected.effects), unit_of(corrected)
+    worth = {s: missed(logs, law, found["gap"]["horizon"], unit) for s, logs in robots_of(case).items()}
     names = tuple(effect["name"] for effect in case["effects"])
     values = shapley(names, lambda joined: -worth[joined])
     whole = worth[frozenset(names)]
