@@ -99,11 +99,15 @@ def prepare(
     if law is not None:
         return found
     outlying, windows, first = without_outliers(fitted, windows, first, pieces)
-    law = _sized(first, windows)
-    other = better_valley(first, windows, law)
-    if other is not None:
-        first, law = other, _sized(other, windows)
+    first, law = _settled(first, windows)
     return found._replace(windows=windows, frames=frames_of(fitted, frozen, outlying), nominal=first, law=law)
+
+
+def _settled(fit: Solution, windows: Windows) -> tuple[Solution, Law]:
+    """The nominal fit in the lower of two valleys, and the noise law of what it leaves."""
+    law = _sized(fit, windows)
+    other = better_valley(fit, windows, law)
+    return (fit, law) if other is None else (other, _sized(other, windows))
 
 
 def _sized(fit: Solution, windows: Windows) -> Law:

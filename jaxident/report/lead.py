@@ -32,7 +32,7 @@ def lead(found: Diagnosis) -> str:
 
 
 def _ahead(found: Diagnosis) -> str:
-    return f"{found.gap.horizon:.3g} s ahead"
+    return f"{found.gap.horizon:.3g}{words.SPACE}s ahead"
 
 
 def _size(found: Diagnosis) -> str:
