@@ -57,9 +57,10 @@ def models(known: Log, diagnosed: bool) -> Iterator[tuple[str, bool, Model]]:
         yield method, bool(found.ok), found.model
     if diagnosed:
         gap = ji.diagnose(known)
+        ok = gap.verdict != "undecided"
         names = ", ".join(effect.name for effect in gap.corrected_model.effects)
-        yield "diagnose, nominal", True, gap.nominal_model
-        yield f"diagnose, corrected ({names})", True, gap.corrected_model
+        yield "diagnose, nominal", ok, gap.nominal_model
+        yield f"diagnose, corrected ({names})", ok, gap.corrected_model
 
 
 def judge(

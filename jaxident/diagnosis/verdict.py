@@ -82,7 +82,7 @@ def judge(
     known_there = () if simulator is None else simulator.effects
     if values is None:
         values = {
-            effects: (value(c, finding.price), tuple(name for name in effects if name not in known_there))
+            effects: (value(c, finding.asked), tuple(name for name in effects if name not in known_there))
             for effects, c in finding.candidates.items()
         }
     sure = {name for name, evidence in extra.items() if evidence > ENOUGH} - set(known_there)

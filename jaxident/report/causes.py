@@ -91,7 +91,7 @@ def _ranking(found: Diagnosis) -> Figure | str:
     names = [_label(c.effects) for c in best]
     groups = {name: _group(c, found, alike) for name, c in zip(names, best, strict=True)}
     notes = {n: chance(sets.get(tuple(sorted(c.effects)), 0.0)) for n, c in zip(names, best, strict=True)}
-    needed = {n: c.gain - value(c, finding.price) for n, c in zip(names, best, strict=True)}
+    needed = {n: c.gain - value(c, finding.asked) for n, c in zip(names, best, strict=True)}
     figure, ax = plot.figure(size=(6.3, 1.0 + _row(names) * max(len(best), 2)))
     plot.ranking({n: c.gain for n, c in zip(names, best, strict=True)}, needed, notes=notes,
                  groups={name: group for name, group in groups.items() if group}, ax=ax)  # fmt: skip

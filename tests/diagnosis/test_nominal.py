@@ -30,8 +30,8 @@ def windows_of(hold):
 
 
 def test_steady_speeds_answer_the_commands():
-    """Mean speeds of windows of 1.5 s, the time constants are 0.3 and 0.2 s: a third of what is commanded before a
-    window still acts in it."""
+    """Windows last 1.5 s, the time constants are 0.3 and 0.2 s. The speed at the beginning of a window still comes from
+    the command before, so that the answers are only about right."""
     point = steady_point(windows_of(25))
     answers = point[2:6] / np.exp(point[[0, 0, 1, 1]])
     truth = np.ravel(DRIVE.gain) / np.repeat(DRIVE.rate, 2)

@@ -82,9 +82,9 @@ class Finding(NamedTuple):
         return max(ENOUGH, TERMS * largest(self.terms))
 
     @property
-    def price(self) -> float:
+    def asked(self) -> float:
         """What an effect beside others was asked for when the set was selected: `further`, or ENOUGH where the set
-        stays in spite of what is left. Its probability is told by the same price."""
+        stays in spite of what is left. Its probability is told by the same number."""
         best = max(self.candidates.values(), key=lambda candidate: value(candidate, self.further))
         return self.further if best.effects == self.selected else ENOUGH
 
