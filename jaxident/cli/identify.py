@@ -73,7 +73,6 @@ def command(logs, method, noise_law, coupling, d_max, reading, count, resample, 
     from jaxident.files.logs import read_logs
     from jaxident.files.models import model_to_dict, save_model
     from jaxident.log import join
-    from jaxident.robot.model import Provenance
 
     for option in [name for name, value in (("--report", report), ("--bootstrap", count)) if value is not None]:
         if method != "maximum-likelihood":
@@ -83,7 +82,8 @@ def command(logs, method, noise_law, coupling, d_max, reading, count, resample, 
     with working("identifying"):
         found = identify(records, method, reading=reading and reading.replace("-", "_"), **settings)
     again = count and _resample(found, records, count, resample, seed, d_max)
-    origin = with_session(Provenance(jaxident.__version__, method, tuple(logs)), join(records))
+    origin = found.model.provenance._replace(version=jaxident.__version__, method=method, logs=tuple(logs))
+    origin = with_session(origin, join(records))
     model = dataclasses.replace(found.model, provenance=origin)
     rows = verdicts(model, max(float(abs(u).max()) for record in records for u in record.command))
     _say(found, rows, method, again)

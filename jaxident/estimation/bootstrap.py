@@ -27,6 +27,7 @@ from jaxident.estimation.likelihood import innovations
 from jaxident.estimation.maximum_likelihood import MOST_STEPS
 from jaxident.estimation.parameters import Law, Robot, from_vector, names, to_vector
 from jaxident.estimation.precision import law_of, natural_values
+from jaxident.estimation.prior import Prior
 from jaxident.estimation.replicate import replicate_run
 from jaxident.estimation.runs import Runs, run_axes, stack_runs
 from jaxident.estimation.scoring import Point, search_from
@@ -91,12 +92,14 @@ def bootstrap(
     _check(resample, runs, block)
     if resample == "blocks":
         block = block or block_length(np.asarray(fitted[2]), np.asarray(runs.seen))
-    arrays = jax.tree.map(jnp.asarray, (*fitted, runs, D_MAX_SHARE * largest if d_max is None else d_max))
-    robot, begins, innovation, runs, limit = arrays
+    arrays = jax.tree.map(
+        jnp.asarray, (*fitted, runs, D_MAX_SHARE * largest if d_max is None else d_max, found.fit.prior)
+    )
+    robot, begins, innovation, runs, limit, prior = arrays
     keys = jax.random.split(key, count)
     if block is not None:
-        innovation = innovation * enlargement(keys[:PILOTS], robot, begins, innovation, runs, limit, law, block)
-    values, ok, _ = refit(keys, robot, begins, innovation, runs, limit, law, block)
+        innovation = innovation * enlargement(keys[:PILOTS], robot, begins, innovation, runs, limit, law, block, prior)
+    values, ok, _ = refit(keys, robot, begins, innovation, runs, limit, law, block, prior)
     estimate = np.asarray(natural_values(robot, law))
     return summarise(estimate, np.asarray(values), np.asarray(ok), names(law), resample, block)
 
@@ -144,7 +147,15 @@ def describe(found: Bootstrap) -> str:
 
 
 def enlargement(
-    keys: Array, robot: Robot, starts: Array, normalised: Array, runs: Runs, d_max: Array, law: Law, block: Array
+    keys: Array,
+    robot: Robot,
+    starts: Array,
+    normalised: Array,
+    runs: Runs,
+    d_max: Array,
+    law: Law,
+    block: Array,
+    prior: Prior,
 ) -> Array:
     """By what to multiply innovations (runs, 3, rows) so that they have the long-run variance of the errors: (3, 1).
 
@@ -153,14 +164,22 @@ def enlargement(
     Efron and Tibshirani 1993, ch. 10).
     """
     before = long_run_variance(normalised, runs.seen, block)
-    _, ok, after = refit(keys, robot, starts, normalised, runs, d_max, law, block)
+    _, ok, after = refit(keys, robot, starts, normalised, runs, d_max, law, block, prior)
     mean = jnp.sum(jnp.where(ok[:, None], after, 0.0), axis=0) / jnp.maximum(jnp.sum(ok), 1)
     return jnp.sqrt(jnp.clip(safe_divide(before, mean, 1.0), 1.0, LARGEST_FACTOR))[:, None]
 
 
 @partial(jax.jit, static_argnames="law")
 def refit(
-    keys: Array, robot: Robot, starts: Array, normalised: Array, runs: Runs, d_max: Array, law: Law, block: Array | None
+    keys: Array,
+    robot: Robot,
+    starts: Array,
+    normalised: Array,
+    runs: Runs,
+    d_max: Array,
+    law: Law,
+    block: Array | None,
+    prior: Prior,
 ) -> tuple[Array, Array, Array]:
     """Replicates (keys, unknowns) in natural units, whether each arrived, and the long-run variances (keys, 3) that are
     left in their own innovations: from blocks of some rows, or of whole runs (block None, no variances). Pure."""
@@ -168,7 +187,7 @@ def refit(
 
     def one(key: Array) -> tuple[Array, Array, Array]:
         own, begin = _resampled(key, robot, point, normalised, runs, block)
-        end = search_from(begin, own, law, d_max, MOST_STEPS)
+        end = search_from(begin, own, law, d_max, MOST_STEPS, prior)
         values = natural_values(from_vector(end.point.shared, law), law)
         left = jnp.zeros(3)
         if block is not None:

@@ -13,12 +13,17 @@ from jaxident.estimation.maximum_likelihood import Fit
 from jaxident.estimation.noise_law import WHITE, colour, fit_law
 from jaxident.estimation.parameters import Law, names, to_vector
 from jaxident.estimation.precision import difference_covariance, spread_of
+from jaxident.estimation.prior import RATE, from_prior
 from jaxident.estimation.runs import Runs, stack_runs
 from jaxident.estimation.suspicions import log_suspicions
 from jaxident.log import Log
 from jaxident.robot.model import Model, Provenance
 
 SMALLEST_LOG = 20
+COASTED = (
+    "the poses alone ask for a robot that coasts through each run, whatever it is told; robots answer within some "
+    f"seconds: rates held at {RATE:g} 1/s; record longer runs, in which the commands change"
+)
 
 
 class PoseFit(NamedTuple):
@@ -76,7 +81,7 @@ def _model(fit: Fit, law: Law, period: float) -> Model:
         standard_deviation=spread_of(fit.covariance, difference, law),
         covariance=fit.covariance,
         parameter_order=names(law),
-        provenance=Provenance(method="maximum-likelihood"),
+        provenance=Provenance(method="maximum-likelihood", from_prior=from_prior(np.asarray(fit.prior_share), law)),
     )
 
 
@@ -93,6 +98,8 @@ def _suspicions(fit: Fit, law: Law, runs: Runs, noise_law: str) -> tuple[str, ..
         lines.append(
             "wheels seem to slip at random: they do, or the model lacks something; `jaxident diagnose` tells which"
         )
+    if np.any(fit.prior.held):
+        lines.append(COASTED)
     found = colour(fit, runs)
     if not found < WHITE:
         tried = "no noise law makes them white, so the model may lack something: `jaxident diagnose` looks for it"

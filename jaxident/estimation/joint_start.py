@@ -11,6 +11,7 @@ from jaxident.estimation.filter import Belief, first_belief, scan_filter
 from jaxident.estimation.joint_step import PARAMETERS
 from jaxident.estimation.maximum_likelihood import fit_runs
 from jaxident.estimation.parameters import NAMES, Law, Robot, to_vector
+from jaxident.estimation.prior import no_prior
 from jaxident.estimation.runs import Runs
 from jaxident.robot.dead_zone import effective_command
 from jaxident.robot.drive import Physical, force, hold
@@ -30,7 +31,7 @@ def begin_from_run(run: Runs, d_max: Array, law: Law) -> tuple[Belief, Noise, Ar
     starts from nothing (Ljung 1979).
     """
     runs = jax.tree.map(lambda leaf: jnp.asarray(leaf)[None] if jnp.ndim(leaf) else jnp.asarray(leaf), run)
-    fit = fit_runs(runs, d_max, law)
+    fit = fit_runs(runs, d_max, law, no_prior())
     vector, noise = to_vector(fit.robot, law)[:PARAMETERS], fit.robot.noise
     widest = widest_variance(vector, d_max)
     wide = fit.covariance[:PARAMETERS, :PARAMETERS]

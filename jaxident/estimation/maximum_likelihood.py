@@ -1,4 +1,4 @@
-"""Maximum likelihood on camera poses: whole runs, several at once, under one of several noise laws."""
+"""Maximum likelihood on camera poses: whole runs, several at once, under one of several noise laws, beside a weak prior."""
 
 from functools import partial
 from typing import Any, NamedTuple
@@ -7,10 +7,12 @@ import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array
+from jaxident.estimation.covariance import posterior_at
 from jaxident.estimation.likelihood import Innovations, innovations
 from jaxident.estimation.parameters import Law, Robot, from_vector, to_vector
+from jaxident.estimation.prior import Prior, prior_of
 from jaxident.estimation.runs import Runs, cut_windows, run_axes
-from jaxident.estimation.scoring import Point, Search, covariance_at, search_from
+from jaxident.estimation.scoring import Point, Search, search_from, with_prior
 from jaxident.estimation.starter import Start, channels, first_estimate, start_states
 from jaxident.numerics import in_blocks
 from jaxident.robot.drive import Physical
@@ -28,9 +30,10 @@ class Fit(NamedTuple):
     """A maximum-likelihood estimate.
 
     robot: drive, dead zones and noise law. starts (runs, 5): states x, y, theta, v, w at the first row of each run.
-    covariance (unknowns, unknowns) in the order of `parameters.names(law)`, natural units. log_likelihood: of the
-    measured poses. innovations (runs, 3, rows): normalised, and their log variances. ok: the search arrived, everything
-    is finite, and there are more numbers than unknowns. steps: of the search.
+    covariance (unknowns, unknowns) in the order of `parameters.names(law)`, natural units, from poses and prior.
+    log_likelihood: of the measured poses. innovations (runs, 3, rows): normalised, and their log variances. ok: the
+    search arrived, everything is finite, and there are more numbers than unknowns. steps: of the search. prior: the one
+    used; prior_share (unknowns,): how much of each variance is the prior's.
     """
 
     robot: Robot
@@ -40,6 +43,8 @@ class Fit(NamedTuple):
     innovations: Innovations
     ok: Any
     steps: Any
+    prior: Prior | None = None
+    prior_share: Any = None
 
 
 class Beginning(NamedTuple):
@@ -74,19 +79,20 @@ def first_point(beginning: Beginning, step: Array, law: Law) -> Point:
     return Point(to_vector(Robot(drive, estimate.dead_zone, noise), law), starts)
 
 
-def fit_runs(runs: Runs, d_max: Array, law: Law = WHITE) -> Fit:
-    """The estimate from runs (runs, rows) under a law, from the data alone; pure, maps over trials.
+def fit_runs(runs: Runs, d_max: Array, law: Law = WHITE, prior: Prior | None = None) -> Fit:
+    """The estimate from runs (runs, rows) under a law and a prior, by default the weak one; pure, maps over trials.
 
     d_max: largest dead zone [unit of the command]. A fit that fails comes back finite where it stopped, ok False.
     """
-    return fit_from(begin(runs, d_max), runs, d_max, law)
+    return fit_from(begin(runs, d_max), runs, d_max, law, prior_of(runs) if prior is None else prior)
 
 
 @partial(jax.jit, static_argnames=("law",))
-def fit_from(beginning: Beginning, runs: Runs, d_max: Array, law: Law) -> Fit:
+def fit_from(beginning: Beginning, runs: Runs, d_max: Array, law: Law, prior: Prior) -> Fit:
     """The estimate by a search from a given beginning."""
-    search = search_from(first_point(beginning, runs.step, law), runs, law, d_max, MOST_STEPS)
-    covariance = covariance_at(search.point, search.local, law)
+    search = search_from(first_point(beginning, runs.step, law), runs, law, d_max, MOST_STEPS, prior)
+    covariance, share = posterior_at(search.point, search.local, law, prior)
+    value = with_prior(search.local, search.point.shared, law, prior, -1.0).value
     found = jax.vmap(lambda start, run: innovations(search.point.shared, start, run, law), in_axes=(0, run_axes(runs)))(
         search.point.starts, runs
     )
@@ -94,10 +100,12 @@ def fit_from(beginning: Beginning, runs: Runs, d_max: Array, law: Law) -> Fit:
         robot=from_vector(search.point.shared, law),
         starts=search.point.starts,
         covariance=covariance,
-        log_likelihood=-search.local.value - 1.5 * jnp.sum(runs.seen) * jnp.log(2.0 * jnp.pi),
+        log_likelihood=-value - 1.5 * jnp.sum(runs.seen) * jnp.log(2.0 * jnp.pi),
         innovations=found,
         ok=search.arrived & _regular(search, covariance, runs),
         steps=search.steps,
+        prior=prior,
+        prior_share=share,
     )
 
 

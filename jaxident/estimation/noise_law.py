@@ -1,12 +1,14 @@
 """Which noise law the data ask for: white camera error where the residuals are white, else the likeliest law."""
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.errors import InputError
-from jaxident.estimation.maximum_likelihood import Fit, begin, fit_from
+from jaxident.estimation.maximum_likelihood import Beginning, Fit, begin, fit_from
 from jaxident.estimation.parameters import Law, names
+from jaxident.estimation.prior import RATE, RATE_SPREAD, prior_of
 from jaxident.estimation.residual_tests import whiteness
 from jaxident.estimation.runs import Runs
 
@@ -20,6 +22,7 @@ NOISE_LAWS = {
 
 ROUNDING = 1e-8
 """Camera errors [m], [rad] below this are none: what is left of data without noise is rounding, and never white."""
+NORMAL_HALF = 1.96
 WHITE = 30.6
 """Largest sum of squared residual correlations, 15 of them, of white residuals: chi-squared, 1 in 100."""
 
@@ -30,19 +33,54 @@ def fit_law(runs: Runs, d_max: Array, noise_law: str, coupling: bool) -> tuple[F
 
     "auto" keeps white camera error if the residuals of that fit are white or rounding; otherwise it adds a memory or
     slip, and where that leaves them coloured too, both. Of what it has tried it takes the lowest Bayesian information
-    criterion (Schwarz 1978).
+    criterion (Schwarz 1978). A fit that is coloured and coasts is made again; see `settling_fit`.
     """
     if noise_law not in (*NOISE_LAWS, "auto"):
         raise InputError(f"noise law {noise_law!r}: choose from {', '.join((*NOISE_LAWS, 'auto'))}")
-    beginning = begin(runs, d_max)
+    beginning, prior = begin(runs, d_max), prior_of(runs)
     tried: list[tuple[Fit, Law]] = []
     for laws in (("white",), ("ar1", "slip"), ("slip-ar1",)) if noise_law == "auto" else ((noise_law,),):
         for law in (NOISE_LAWS[name]._replace(coupling=coupling) for name in laws):
-            tried.append((jax.device_get(fit_from(beginning, runs, d_max, law)), law))
-        fit, law = min(tried, key=lambda pair: criterion(pair[0], pair[1], 3 * int(np.sum(runs.seen))))
+            tried.append((jax.device_get(fit_from(beginning, runs, d_max, law, prior)), law))
+        fit, law = likeliest(tried, runs)
         if bool(fit.ok) and colour(fit, runs) < WHITE:
-            break
-    return fit, law
+            return fit, law
+    laws = {law, NOISE_LAWS["slip-ar1"]._replace(coupling=coupling)} if noise_law == "auto" else {law}
+    return settling_fit(beginning, runs, d_max, sorted(laws), fit) or (fit, law)
+
+
+def settling_fit(beginning: Beginning, runs: Runs, d_max: Array, laws: list[Law], fit: Fit) -> tuple[Fit, Law] | None:
+    """The likeliest fit under some laws, with its law, in which rates are held at the prior's middle where a fit has a
+    robot that coasts; None where it does not coast, or no such fit arrives.
+
+    A run's start speed is free. A robot that coasts keeps it, and so has a speed of its own for each run: over many
+    short runs that explains whatever the law has no noise for, and likelihood falls for it by a few units a run.
+    Residuals that stay coloured say that it is the law that is wrong. So its word on rates that no robot has does not
+    count: the commands' answers are fitted at a rate that robots have.
+    """
+    held = coasts(fit, runs)
+    if not np.any(held):
+        return None
+    estimate = beginning.estimate
+    rate = jnp.where(held, RATE, jnp.asarray(fit.robot.drive.rate))
+    estimate = estimate._replace(rate=rate, gain=jnp.zeros((2, 2)), dead_zone=jnp.zeros(2))
+    begin, prior = beginning._replace(estimate=estimate), prior_of(runs)._replace(held=jnp.asarray(held))
+    tried = [(jax.device_get(fit_from(begin, runs, d_max, law, prior)), law) for law in laws]
+    found = likeliest(tried, runs)
+    return found if bool(found[0].ok) else None
+
+
+def coasts(fit: Fit, runs: Runs) -> np.ndarray:
+    """Which of both speeds (2,) hardly answers the commands within a run, at a rate below all but 2.5 % of robots'."""
+    seen = np.asarray(runs.seen)
+    longest = float(np.max(np.sum(np.broadcast_to(np.asarray(runs.step), seen.shape), axis=1)))
+    rate = np.array([float(r) for r in fit.robot.drive.rate])
+    return (rate < RATE * np.exp(-NORMAL_HALF * RATE_SPREAD)) & (rate * longest < 1.0)
+
+
+def likeliest(tried: list[tuple[Fit, Law]], runs: Runs) -> tuple[Fit, Law]:
+    """The fit and law of the lowest criterion."""
+    return min(tried, key=lambda pair: criterion(pair[0], pair[1], 3 * int(np.sum(runs.seen))))
 
 
 def colour(fit: Fit, runs: Runs) -> float:

@@ -10,9 +10,10 @@ import numpy as np
 
 from jaxident.array_types import AT_REST, Array, Pose, State
 from jaxident.errors import InputError
+from jaxident.estimation.covariance import covariance_at
 from jaxident.estimation.parameters import Law, Robot, from_vector, names, to_vector
 from jaxident.estimation.runs import Runs, run_axes, stack_runs
-from jaxident.estimation.scoring import Point, covariance_at, local_at
+from jaxident.estimation.scoring import Point, local_at
 from jaxident.estimation.verdict import Verdict, verdicts_of
 from jaxident.log import Log, join
 from jaxident.numerics import require_float64

@@ -14,12 +14,12 @@ import jax.numpy as jnp
 from jaxident.array_types import Array
 from jaxident.estimation.likelihood import innovations
 from jaxident.estimation.parameters import Law, bounds, is_logarithmic, names
+from jaxident.estimation.prior import Prior, prior_terms
 from jaxident.estimation.runs import Runs, run_axes
 
 START_STATES = 5
 FIRST_DAMPING, EASE, STIFFEN, LEAST_DAMPING, LARGEST_DAMPING = 1e-3, 0.03, 10.0, 1e-12, 1e12
 """The least lies far below the flattest direction of a long run: 1e-6 and 0.1 take 27 steps over 32,000 rows, not 8."""
-FLAT = 1e-13
 TOLERANCE = 1e-7
 """Expected fall of -log p below which the search ends: a step of 4e-4 standard deviations."""
 KINK_STEP, KINK_TOLERANCE = 1e-2, 1e-4
@@ -208,13 +208,21 @@ def adapt(search: Search, better: Array) -> Search:
     return search._replace(damping=Damping(jnp.maximum(dead_zones, others), others), failures=failures)
 
 
-def search_from(point: Point, runs: Runs, law: Law, d_max: Array, most: int) -> Search:
-    """Walk downhill from a point until a step promises less than TOLERANCE, at most `most` steps."""
+def with_prior(local: Local, shared: Array, law: Law, prior: Prior, sign: float = 1.0) -> Local:
+    """A prior's terms added, or with sign -1 taken away again."""
+    value, gradient, curvature = prior_terms(shared, law, prior)
+    slope = local.gradient._replace(shared=local.gradient.shared + sign * gradient)
+    return local._replace(value=local.value + sign * value, gradient=slope, shared=local.shared + sign * curvature)
+
+
+def search_from(point: Point, runs: Runs, law: Law, d_max: Array, most: int, prior: Prior) -> Search:
+    """Walk downhill from a point until a step promises less than TOLERANCE, at most `most` steps; values and curvatures
+    are those of poses and prior."""
     low, high = bounds(law, d_max)
 
     def body(search):
         there = rescale(search.proposed, runs, law)
-        local = local_at(there, runs, law)
+        local = with_prior(local_at(there, runs, law), there.shared, law, prior)
         better = (local.value <= search.local.value) | (search.steps == 0)
         point, local = jax.tree.map(lambda a, b: jnp.where(better, a, b), (there, local), (search.point, search.local))
         after = adapt(search, better)._replace(point=point, local=local, steps=search.steps + 1)
@@ -230,20 +238,3 @@ def search_from(point: Point, runs: Runs, law: Law, d_max: Array, most: int) -> 
     nothing = Local(jnp.asarray(jnp.inf), jax.tree.map(jnp.zeros_like, point), *map(jnp.zeros, shapes))
     damping, no, none = Damping(*jnp.full(2, FIRST_DAMPING)), jnp.asarray(False), jnp.asarray(0)
     return jax.lax.while_loop(walking, body, Search(point, nothing, point, no, damping, none, none, no))
-
-
-def covariance_at(point: Point, local: Local, law: Law) -> Array:
-    """Covariance (unknowns, unknowns) of the shared unknowns in natural units, start states and noise law as nuisance:
-    the inverse of the expected curvature.
-
-    Directions that the data do not determine get a finite, enormous variance (curvature floored at FLAT of the largest,
-    all unknowns scaled alike).
-    """
-    shared, _, _ = eliminate(local, Damping(0.0, 0.0), jnp.zeros(len(names(law)), bool))
-    scale = jnp.sqrt(jnp.diagonal(local.shared))
-    scale = jnp.where(scale > 0.0, scale, 1.0)
-    values, vectors = jnp.linalg.eigh(shared / scale[:, None] / scale)
-    values = jnp.maximum(values, FLAT * jnp.maximum(values[-1], FLAT))
-    natural = jnp.where(is_logarithmic(law), jnp.exp(point.shared), 1.0) / scale
-    rows = natural[:, None] * vectors / jnp.sqrt(values)
-    return rows @ rows.T

@@ -12,11 +12,13 @@ DETERMINED = 0.1
 WEAK = 0.5
 TOGETHER = 0.95
 """Correlation from which a loose parameter is said to move with another."""
+BORROWED, WHY = "from the prior", "this log hardly tells it; number and interval are those of robots in general"
 NOISE_NAMES = ("position", "heading", "correlation_time", "slip_along", "slip_heading")
 
 
 class Verdict(NamedTuple):
-    """One parameter: estimate, 95 % interval, "determined", "weak" or "not determined", and why not ("" otherwise).
+    """One parameter: estimate, 95 % interval, "determined", "weak", "not determined" or "from the prior", and why not
+    determined ("" otherwise). An interval from the prior is what is known of robots in general, not this log's.
 
     The half-width of the interval is compared with the size of the parameter, for a dead zone with the largest
     command: below a tenth determined, below a half weak.
@@ -40,7 +42,9 @@ def verdicts(model: Model, largest_command: float) -> list[Verdict]:
     values = _values(model)
     order = model.parameter_order
     covariance = np.asarray(model.covariance)
-    return verdicts_of(order, np.array([values[name] for name in order]), covariance, largest_command)
+    found = verdicts_of(order, np.array([values[name] for name in order]), covariance, largest_command)
+    borrowed = model.provenance.from_prior
+    return [row._replace(verdict=BORROWED, reason=WHY) if row.parameter in borrowed else row for row in found]
 
 
 def verdicts_of(

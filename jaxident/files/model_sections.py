@@ -175,7 +175,8 @@ def write_covariance(matrix: Any, order: tuple[str, ...]) -> dict[str, Any]:
 
 
 def read_provenance(value: Any, where: str) -> Provenance:
-    """Version and method, the logs, the seed or None, and the session: its duration and the runs that are known."""
+    """Version and method, the logs, the seed or None, the session (its duration and the runs that are known), and which
+    parameters come from the prior."""
     found = take_keys(value, where, (), Provenance._fields)
     version, method = (take_text(found[key] or "", f"{where}.{key}") for key in ("version", "method"))
     logs = take_list(found["logs"] or [], f"{where}.logs")
@@ -187,7 +188,9 @@ def read_provenance(value: Any, where: str) -> Provenance:
     runs = [
         _read_run(run, f"{where}.runs[{k}]") for k, run in enumerate(take_list(found["runs"] or [], f"{where}.runs"))
     ]
-    return Provenance(version, method, names, seed, duration, tuple(runs))
+    loose = take_list(found["from_prior"] or [], f"{where}.from_prior")
+    borrowed = tuple(take_text(one, f"{where}.from_prior[{k}]") for k, one in enumerate(loose))
+    return Provenance(version, method, names, seed, duration, tuple(runs), borrowed)
 
 
 def _read_run(value: Any, where: str) -> tuple[str, float]:
@@ -203,4 +206,7 @@ def write_provenance(origin: Provenance) -> dict[str, Any]:
     content["runs"] = [{"mark": own, "session_time": time} for own, time in origin.runs]
     if not origin.runs:
         del content["runs"], content["duration"]
+    content["from_prior"] = list(origin.from_prior)
+    if not origin.from_prior:
+        del content["from_prior"]
     return content

@@ -11,7 +11,7 @@ from jaxident.estimation.bootstrap import Bootstrap, describe, interval_cells
 from jaxident.estimation.identify import Identification
 from jaxident.estimation.residual_tests import CHANNELS, DRAWN_LAGS, correlations, fit_percent, residual_tests
 from jaxident.estimation.runs import stack_runs
-from jaxident.estimation.verdict import Verdict
+from jaxident.estimation.verdict import BORROWED, Verdict
 from jaxident.files.atomic import Target
 from jaxident.log import Log, join
 from jaxident.plot.style import legend_above
@@ -49,12 +49,14 @@ def _page(found: Identification, log: Log, verdicts: Sequence[Verdict], again: B
 
 def _lead(found: Identification, verdicts: Sequence[Verdict], percent: np.ndarray) -> str:
     sure = sum(row.verdict == "determined" for row in verdicts)
+    borrowed = sum(row.verdict == BORROWED for row in verdicts)
+    lent = f", {borrowed} come from the prior" if borrowed else ""
     worst = CHANNELS[int(np.argmin(percent))]
     ending = "" if bool(found.ok) else " The fit did not converge: do not trust these numbers."
     count = len(found.suspicions)
     doubts = f" Suspicions: {count}, below." if count else " Nothing speaks against it."
     return (
-        f"{sure} of {len(verdicts)} numbers are determined; the model explains {percent.min():.4g} % of {worst} and "
+        f"{sure} of {len(verdicts)} numbers are determined{lent}; the model explains {percent.min():.4g} % of {worst} and "
         f"more of the others.{doubts}{ending}"
     )
 
@@ -123,7 +125,8 @@ def _pictures(found: Identification, log: Log, normalised: np.ndarray, seen: np.
 COLUMNS = ("parameter", "estimate", "95 % interval", "this input")
 ABOUT_INTERVALS = (
     "Intervals hold under the noise law whose numbers stand at the end. Determined: the half-width is below a tenth of "
-    "the parameter (for a dead zone, of the largest command); weak: below a half."
+    "the parameter (for a dead zone, of the largest command); weak: below a half. From the prior: more than half of the "
+    "variance is that of robots in general; the log hardly tells the number, and the interval is not the log's."
 )
 ABOUT_PERCENT = (
     "100 (1 - residual / motion about the run's mean), both root mean square. Residuals are those of the whole run "

@@ -23,7 +23,8 @@ DIFFERENCE_ORDER = (
 
 class Provenance(NamedTuple):
     """Where a model comes from. duration [s]: of all its logs, after which the session time goes on; runs: the mark by
-    which each run is known again (`estimation.session`), and the session time [s] of its first row."""
+    which each run is known again (`estimation.session`), and the session time [s] of its first row. from_prior: names
+    of parameters that come mostly from what is known of robots in general, not from these logs."""
 
     version: str = ""
     method: str = ""
@@ -31,6 +32,7 @@ class Provenance(NamedTuple):
     seed: int | None = None
     duration: float = 0.0
     runs: tuple[tuple[str, float], ...] = ()
+    from_prior: tuple[str, ...] = ()
 
 
 class Spread(NamedTuple):
