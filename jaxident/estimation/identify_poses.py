@@ -98,7 +98,7 @@ def _suspicions(fit: Fit, law: Law, runs: Runs, noise_law: str) -> tuple[str, ..
         lines.append(
             "wheels seem to slip at random: they do, or the model lacks something; `jaxident diagnose` tells which"
         )
-    if np.any(fit.prior.held):
+    if fit.prior is not None and np.any(fit.prior.held):
         lines.append(COASTED)
     found = colour(fit, runs)
     if not found < WHITE:

@@ -1,4 +1,4 @@
-"""Maximum likelihood on camera poses: whole runs, several at once, under one of several noise laws, beside a weak prior."""
+"""Maximum likelihood on camera poses: whole runs, several at once, under one of several noise laws and a weak prior."""
 
 from functools import partial
 from typing import Any, NamedTuple

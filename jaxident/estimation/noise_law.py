@@ -8,7 +8,7 @@ from jaxident.array_types import Array
 from jaxident.errors import InputError
 from jaxident.estimation.maximum_likelihood import Beginning, Fit, begin, fit_from
 from jaxident.estimation.parameters import Law, names
-from jaxident.estimation.prior import RATE, RATE_SPREAD, prior_of
+from jaxident.estimation.prior import RATE, RATE_SPREAD, SIGNS, prior_of
 from jaxident.estimation.residual_tests import whiteness
 from jaxident.estimation.runs import Runs
 
@@ -23,6 +23,8 @@ NOISE_LAWS = {
 ROUNDING = 1e-8
 """Camera errors [m], [rad] below this are none: what is left of data without noise is rounding, and never white."""
 NORMAL_HALF = 1.96
+CLEAR = 3.0
+"""Standard deviations from zero from which on a gain has a sign."""
 WHITE = 30.6
 """Largest sum of squared residual correlations, 15 of them, of white residuals: chi-squared, 1 in 100."""
 
@@ -33,30 +35,30 @@ def fit_law(runs: Runs, d_max: Array, noise_law: str, coupling: bool) -> tuple[F
 
     "auto" keeps white camera error if the residuals of that fit are white or rounding; otherwise it adds a memory or
     slip, and where that leaves them coloured too, both. Of what it has tried it takes the lowest Bayesian information
-    criterion (Schwarz 1978). A fit that is coloured and coasts is made again; see `settling_fit`.
+    criterion (Schwarz 1978). A fit of a robot that coasts is made again; see `settling_fit`.
     """
     if noise_law not in (*NOISE_LAWS, "auto"):
         raise InputError(f"noise law {noise_law!r}: choose from {', '.join((*NOISE_LAWS, 'auto'))}")
     beginning, prior = begin(runs, d_max), prior_of(runs)
     tried: list[tuple[Fit, Law]] = []
-    for laws in (("white",), ("ar1", "slip"), ("slip-ar1",)) if noise_law == "auto" else ((noise_law,),):
-        for law in (NOISE_LAWS[name]._replace(coupling=coupling) for name in laws):
+    for kinds in (("white",), ("ar1", "slip"), ("slip-ar1",)) if noise_law == "auto" else ((noise_law,),):
+        for law in (NOISE_LAWS[name]._replace(coupling=coupling) for name in kinds):
             tried.append((jax.device_get(fit_from(beginning, runs, d_max, law, prior)), law))
         fit, law = likeliest(tried, runs)
         if bool(fit.ok) and colour(fit, runs) < WHITE:
-            return fit, law
-    laws = {law, NOISE_LAWS["slip-ar1"]._replace(coupling=coupling)} if noise_law == "auto" else {law}
-    return settling_fit(beginning, runs, d_max, sorted(laws), fit) or (fit, law)
+            break
+    both = NOISE_LAWS["slip-ar1"]._replace(coupling=coupling)
+    laws = [law] if noise_law != "auto" or law == both else [law, both]
+    return settling_fit(beginning, runs, d_max, laws, fit) or (fit, law)
 
 
 def settling_fit(beginning: Beginning, runs: Runs, d_max: Array, laws: list[Law], fit: Fit) -> tuple[Fit, Law] | None:
     """The likeliest fit under some laws, with its law, in which rates are held at the prior's middle where a fit has a
     robot that coasts; None where it does not coast, or no such fit arrives.
 
-    A run's start speed is free. A robot that coasts keeps it, and so has a speed of its own for each run: over many
-    short runs that explains whatever the law has no noise for, and likelihood falls for it by a few units a run.
-    Residuals that stay coloured say that it is the law that is wrong. So its word on rates that no robot has does not
-    count: the commands' answers are fitted at a rate that robots have.
+    A run's start speed is free. A robot that coasts keeps it, and so has a speed of its own for each run. Over many
+    short runs that explains whatever the law has no noise for, by a few units of -log p a run: far more than a weak
+    prior weighs. So a rate below any robot's counts only where the law is right and the commands move the robot.
     """
     held = coasts(fit, runs)
     if not np.any(held):
@@ -71,11 +73,14 @@ def settling_fit(beginning: Beginning, runs: Runs, d_max: Array, laws: list[Law]
 
 
 def coasts(fit: Fit, runs: Runs) -> np.ndarray:
-    """Which of both speeds (2,) hardly answers the commands within a run, at a rate below all but 2.5 % of robots'."""
-    seen = np.asarray(runs.seen)
-    longest = float(np.max(np.sum(np.broadcast_to(np.asarray(runs.step), seen.shape), axis=1)))
-    rate = np.array([float(r) for r in fit.robot.drive.rate])
-    return (rate < RATE * np.exp(-NORMAL_HALF * RATE_SPREAD)) & (rate * longest < 1.0)
+    """Which of both speeds (2,) coast: at a rate below all but 2.5 % of robots', too slow to settle within the longest
+    run, and either under residuals that are coloured or by gains whose signs are not clearly a differential drive's."""
+    rate, gain = np.array(fit.robot.drive.rate, float), np.array(fit.robot.drive.gain, float)
+    deviation = np.sqrt(np.diagonal(np.asarray(fit.covariance))[2:6]).reshape(2, 2)
+    longest = float(np.max(np.sum(np.broadcast_to(np.asarray(runs.step), runs.seen.shape), axis=1)))
+    slow = (rate < RATE * np.exp(-NORMAL_HALF * RATE_SPREAD)) & (rate * longest < 1.0)
+    driven = np.all(np.array(SIGNS) * gain > CLEAR * deviation, axis=1)
+    return slow & (~driven | (colour(fit, runs) >= WHITE))
 
 
 def likeliest(tried: list[tuple[Fit, Law]], runs: Runs) -> tuple[Fit, Law]:

@@ -1,7 +1,7 @@
 """What is known of a robot before its log is read: weak priors in physical units.
 
-Rates [1/s] are absolute: robots from 5 cm to 5 m answer within 0.03 to 3 s, so that 0.3 to 30 1/s hold 95 %, log-normal.
-All else is measured by the log's own speed S and largest command U, for a toy's speed is no truck's, and the command's
+Rates [1/s] are absolute: robots from 5 cm to 5 m answer within 0.03 to 3 s. They are log-normal, 95 % in 0.3 to 30.
+All else is measured by the log's own speed S and largest command U: a toy is slower than a truck, and the command's
 unit is the user's. S [m/s] is the larger of the speed along and the turn rate at HALF_TRACK; it covers both channels.
 The steady speed per command, gain over rate, is normal about SPEED S / U with that same deviation, its sign that of a
 differential drive: + + along and + - in heading. Dead zones are normal about DEAD_ZONE U, deviation DEAD_ZONE_SPREAD U.
@@ -26,20 +26,24 @@ RATE, RATE_SPREAD = 3.0, 1.175
 SPEED = 1.5
 """Steady speed at the largest command of one wheel, over S."""
 HALF_TRACK = 0.25
-"""Distance [m] that makes a turn rate a speed. A smaller robot turns faster than it goes, which raises S for it. A
-larger one has a smaller gain in heading than the prior's middle, by less than the deviation."""
+"""Distance [m] by which a turn rate is taken as a speed. A smaller robot turns fast, which raises S for it. A larger
+one has a smaller gain in heading than the prior's middle, by less than the deviation."""
+SIGNS = ((1.0, 1.0), (1.0, -1.0))
+"""Of the gains of a differential drive."""
 DEAD_ZONE, DEAD_ZONE_SPREAD = 0.15, 0.3
 LAG_SHARE, LONGEST_LAG = 10, 25
 """Rows over which speeds are taken: a tenth of a run, 25 at most. Over one row the camera's error would rule."""
 FIRMLY = 1e4
 """Weight on the departure of a rate that is held at the prior's middle."""
 MOSTLY = 0.5
-"""Share of a number's variance that is the prior's from which the number is called the prior's: of a single number, a
-deviation beyond 0.7 of the prior's."""
+"""A number is called the prior's from this share of its variance on. A number that depends on no other then has more
+than 0.7 of the prior's deviation."""
+FLAT = 1e-13
+"""Floor of the curvature, relative to its largest, all unknowns scaled alike."""
 
 
 class Prior(NamedTuple):
-    """speed [m/s] and command [unit]: S and U. held (2,): whether a rate stays at RATE. weight: 1, or 0 for no prior."""
+    """speed [m/s] and command [unit]: S and U. held (2,): whether a rate stays at RATE. weight: 1, or 0 for none."""
 
     speed: Any
     command: Any
@@ -69,7 +73,8 @@ def speeds(runs: Runs) -> tuple[Array, Array]:
 
     def size(way: Array) -> Array:
         squares = safe_divide(way[:, lag:] - way[:, :-lag], passed, 0.0) ** 2
-        return jnp.sqrt(jnp.sum(jnp.where(usable, squares, 0.0)) / jnp.maximum(jnp.sum(usable), 1))
+        mean = jnp.sum(jnp.where(usable, squares, 0.0)) / jnp.maximum(jnp.sum(usable), 1)
+        return jnp.sqrt(jnp.maximum(mean, 1e-24))
 
     return size(path), size(heading)
 
@@ -92,7 +97,7 @@ def departures(shared: Array, law: Law, prior: Prior) -> Array:
     two rates, four steady speeds, two dead zones, and two couplings where the law has them."""
     firmness = jnp.where(prior.held, FIRMLY, 1.0)
     rates = firmness * (shared[:2] - jnp.log(RATE)) / RATE_SPREAD
-    sizes = SPEED * prior.speed * jnp.array([[1.0, 1.0], [1.0, -1.0]]) / jnp.array([[1.0], [HALF_TRACK]])
+    sizes = SPEED * prior.speed * jnp.array(SIGNS) / jnp.array([[1.0], [HALF_TRACK]])
     steady = shared[2:6].reshape(2, 2) * jnp.exp(-shared[:2])[:, None] * prior.command
     gains = (steady / sizes - 1.0).ravel()
     dead_zones = (shared[6:8] / prior.command - DEAD_ZONE) / DEAD_ZONE_SPREAD
@@ -101,7 +106,8 @@ def departures(shared: Array, law: Law, prior: Prior) -> Array:
 
 
 def prior_terms(shared: Array, law: Law, prior: Prior) -> tuple[Array, Array, Array]:
-    """Half the squared departures, their gradient (unknowns,) and curvature (unknowns, unknowns), as scoring takes it."""
+    """Half the squared departures, their gradient (unknowns,) and curvature (unknowns, unknowns) without second
+    derivatives."""
 
     def both(shared):
         found = departures(shared, law, prior)
@@ -129,10 +135,6 @@ def posterior(data: Array, shared: Array, law: Law, prior: Prior) -> tuple[Array
     share = jnp.einsum("ij,jk,ki->i", covariance, own, covariance) / jnp.diagonal(covariance)
     natural = jnp.where(is_logarithmic(law), jnp.exp(shared), 1.0)
     return natural[:, None] * covariance * natural, jnp.clip(share, 0.0, 1.0)
-
-
-FLAT = 1e-13
-"""Floor of the curvature, relative to its largest, all unknowns scaled alike."""
 
 
 def _strike(whole: Array, held: Array) -> Array:

@@ -56,8 +56,8 @@ def _lead(found: Identification, verdicts: Sequence[Verdict], percent: np.ndarra
     count = len(found.suspicions)
     doubts = f" Suspicions: {count}, below." if count else " Nothing speaks against it."
     return (
-        f"{sure} of {len(verdicts)} numbers are determined{lent}; the model explains {percent.min():.4g} % of {worst} and "
-        f"more of the others.{doubts}{ending}"
+        f"{sure} of {len(verdicts)} numbers are determined{lent}; the model explains {percent.min():.4g} % of {worst} "
+        f"and more of the others.{doubts}{ending}"
     )
 
 
@@ -125,8 +125,8 @@ def _pictures(found: Identification, log: Log, normalised: np.ndarray, seen: np.
 COLUMNS = ("parameter", "estimate", "95 % interval", "this input")
 ABOUT_INTERVALS = (
     "Intervals hold under the noise law whose numbers stand at the end. Determined: the half-width is below a tenth of "
-    "the parameter (for a dead zone, of the largest command); weak: below a half. From the prior: more than half of the "
-    "variance is that of robots in general; the log hardly tells the number, and the interval is not the log's."
+    "the parameter (for a dead zone, of the largest command); weak: below a half. From the prior: more than half of "
+    "the variance is that of robots in general; the log hardly tells the number, and the interval is not the log's."
 )
 ABOUT_PERCENT = (
     "100 (1 - residual / motion about the run's mean), both root mean square. Residuals are those of the whole run "
