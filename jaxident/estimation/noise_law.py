@@ -8,7 +8,7 @@ from jaxident.array_types import Array
 from jaxident.errors import InputError
 from jaxident.estimation.maximum_likelihood import Beginning, Fit, begin, fit_from
 from jaxident.estimation.parameters import Law, names
-from jaxident.estimation.prior import RATE, RATE_SPREAD, SIGNS, prior_of
+from jaxident.estimation.prior import RATE, RATE_SPREAD, SIGNS, Prior, middle_gain, prior_of
 from jaxident.estimation.residual_tests import whiteness
 from jaxident.estimation.runs import Runs
 
@@ -25,6 +25,8 @@ ROUNDING = 1e-8
 NORMAL_HALF = 1.96
 CLEAR = 3.0
 """Standard deviations from zero from which on a gain has a sign."""
+AS_LIKELY = 1.0
+"""Fall of log p by which a search that arrived may end below one that did not."""
 WHITE = 30.6
 """Largest sum of squared residual correlations, 15 of them, of white residuals: chi-squared, 1 in 100."""
 
@@ -43,13 +45,28 @@ def fit_law(runs: Runs, d_max: Array, noise_law: str, coupling: bool) -> tuple[F
     tried: list[tuple[Fit, Law]] = []
     for kinds in (("white",), ("ar1", "slip"), ("slip-ar1",)) if noise_law == "auto" else ((noise_law,),):
         for law in (NOISE_LAWS[name]._replace(coupling=coupling) for name in kinds):
-            tried.append((jax.device_get(fit_from(beginning, runs, d_max, law, prior)), law))
+            fit, beginning = fit_twice(beginning, runs, d_max, law, prior)
+            tried.append((fit, law))
         fit, law = likeliest(tried, runs)
         if bool(fit.ok) and colour(fit, runs) < WHITE:
             break
     both = NOISE_LAWS["slip-ar1"]._replace(coupling=coupling)
     laws = [law] if noise_law != "auto" or law == both else [law, both]
     return settling_fit(beginning, runs, d_max, laws, fit) or (fit, law)
+
+
+def fit_twice(beginning: Beginning, runs: Runs, d_max: Array, law: Law, prior: Prior) -> tuple[Fit, Beginning]:
+    """The fit from a beginning, and that beginning. Where the search does not arrive, one from the prior's middle takes
+    its place if it is as likely; under slip one search is long enough."""
+    fit = jax.device_get(fit_from(beginning, runs, d_max, law, prior))
+    if bool(fit.ok) or law.slip:
+        return fit, beginning
+    nothing = beginning.estimate._replace(gain=middle_gain(prior), dead_zone=jnp.zeros(2))
+    nothing = nothing._replace(rate=jnp.full(2, RATE))
+    middle = beginning._replace(estimate=nothing)
+    other = jax.device_get(fit_from(middle, runs, d_max, law, prior))
+    least = float(fit.log_likelihood) - (AS_LIKELY if bool(other.ok) else 0.0)
+    return (other, middle) if float(other.log_likelihood) >= least else (fit, beginning)
 
 
 def settling_fit(beginning: Beginning, runs: Runs, d_max: Array, laws: list[Law], fit: Fit) -> tuple[Fit, Law] | None:
@@ -63,10 +80,10 @@ def settling_fit(beginning: Beginning, runs: Runs, d_max: Array, laws: list[Law]
     held = coasts(fit, runs)
     if not np.any(held):
         return None
-    estimate = beginning.estimate
+    estimate, prior = beginning.estimate, prior_of(runs)._replace(held=jnp.asarray(held))
     rate = jnp.where(held, RATE, jnp.asarray(fit.robot.drive.rate))
-    estimate = estimate._replace(rate=rate, gain=jnp.zeros((2, 2)), dead_zone=jnp.zeros(2))
-    begin, prior = beginning._replace(estimate=estimate), prior_of(runs)._replace(held=jnp.asarray(held))
+    estimate = estimate._replace(rate=rate, gain=jnp.asarray(middle_gain(prior)), dead_zone=jnp.zeros(2))
+    begin = beginning._replace(estimate=estimate)
     tried = [(jax.device_get(fit_from(begin, runs, d_max, law, prior)), law) for law in laws]
     found = likeliest(tried, runs)
     return found if bool(found[0].ok) else None

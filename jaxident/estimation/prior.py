@@ -92,14 +92,23 @@ def _travelled(run: Runs) -> tuple[Array, Array, Array]:
     return jnp.cumsum(x * cosine + y * sine), jnp.cumsum(turn), row_times(run)[now]
 
 
+def middle_gain(prior: Prior) -> Array:
+    """Gains (2, 2) at the prior's middle."""
+    return RATE * _steady_speeds(prior)
+
+
+def _steady_speeds(prior: Prior) -> Array:
+    """Steady speeds per command (2, 2) at the prior's middle [m/s, rad/s per unit]."""
+    return SPEED * prior.speed / prior.command * jnp.array(SIGNS) / jnp.array([[1.0], [HALF_TRACK]])
+
+
 def departures(shared: Array, law: Law, prior: Prior) -> Array:
     """How far a vector (unknowns,) of shared unknowns departs from the prior, in its deviations, one after the other:
     two rates, four steady speeds, two dead zones, and two couplings where the law has them."""
     firmness = jnp.where(prior.held, FIRMLY, 1.0)
     rates = firmness * (shared[:2] - jnp.log(RATE)) / RATE_SPREAD
-    sizes = SPEED * prior.speed * jnp.array(SIGNS) / jnp.array([[1.0], [HALF_TRACK]])
-    steady = shared[2:6].reshape(2, 2) * jnp.exp(-shared[:2])[:, None] * prior.command
-    gains = (steady / sizes - 1.0).ravel()
+    steady = shared[2:6].reshape(2, 2) * jnp.exp(-shared[:2])[:, None]
+    gains = (steady / _steady_speeds(prior) - 1.0).ravel()
     dead_zones = (shared[6:8] / prior.command - DEAD_ZONE) / DEAD_ZONE_SPREAD
     couplings = shared[8:10] / (RATE * jnp.array([HALF_TRACK, 1.0 / HALF_TRACK])) if law.coupling else jnp.zeros(0)
     return prior.weight * jnp.concatenate([rates, gains, dead_zones, couplings])

@@ -170,6 +170,14 @@ def newton(local: Local, damping: Damping, held: Array) -> tuple[Array, Array, A
     return step, starts, promised
 
 
+def along_steady_speeds(shared: Array, step: Array) -> Array:
+    """A vector (unknowns,) moved by a step. Gains move so that steady speeds, gain over rate, move in a straight line:
+    poses tell these best, and a rate that hardly matters would otherwise drag them along."""
+    faster = jnp.repeat(step[:2], 2)
+    gain = jnp.exp(faster) * (shared[2:6] + step[2:6] - shared[2:6] * faster)
+    return (shared + step).at[2:6].set(gain)
+
+
 def propose(search: Search, kinked: Array, law: Law, low: Array, high: Array) -> tuple[Point, Array, Array]:
     """The damped step from a search's point, shortened where it is long and cut at the bounds; whether it holds the
     dead zones, as it does where they seem to be at a kink and the others alone promise something; and whether the
@@ -189,7 +197,8 @@ def propose(search: Search, kinked: Array, law: Law, low: Array, high: Array) ->
     longest = jnp.where(is_logarithmic(law), LONGEST_LOG_STEP, jnp.inf)
     longest = longest.at[DEAD_ZONES].set(LONGEST_SHARE * high[DEAD_ZONES])
     part = jnp.minimum(1.0, jnp.min(longest / jnp.maximum(jnp.abs(step), 1e-300)))
-    moved = Point(jnp.clip(point.shared + part * step, low, high), point.starts + part * starts)
+    shared = along_steady_speeds(point.shared, part * step)
+    moved = Point(jnp.clip(shared, low, high), point.starts + part * starts)
     level = (promised >= 0.0) & (promised < TOLERANCE) & (damping.dead_zones <= FIRST_DAMPING)
     tiny = jnp.abs(steps[0]) * jnp.sqrt(jnp.diagonal(local.shared)) < KINK_STEP
     kink = (rest >= 0.0) & (rest * (1.0 + damping.others) < KINK_TOLERANCE) & jnp.all(tiny[DEAD_ZONES])

@@ -86,16 +86,24 @@ def test_prior_changes_nothing_where_poses_speak():
     assert share.max() < 1e-4
 
 
-@pytest.mark.parametrize("pair", [(0.8, 0.6), (0.7, 0.7), (0.1, 0.1)], ids=["bend", "straight", "in the dead zone"])
-def test_one_constant_command_comes_from_the_prior(pair):
-    """Two steady speeds do not tell eight numbers: the estimate is finite, and a robot's."""
-    command = Wheels(*(jnp.full(200, u) for u in pair))
-    fit = FIT(runs_of(jax.random.key(1), command))
-    assert {"dead_zone_r", "gain_11", "gain_12"} <= set(from_prior(np.asarray(fit.prior_share), Law()))
+def test_a_robot_that_never_leaves_its_dead_zones_comes_from_the_prior():
+    """Its gains and dead zones are the prior's, finite and a robot's, whatever the camera's noise looks like."""
+    fit = FIT(runs_of(jax.random.key(1), Wheels(jnp.full(200, 0.1), jnp.full(200, 0.1))))
+    assert fit.ok
+    assert from_prior(np.asarray(fit.prior_share), Law()) == names(Law())[:8]
     assert np.all(np.isfinite(fit.covariance))
     rate, gain = np.array(fit.robot.drive.rate), np.array(fit.robot.drive.gain)
-    assert np.all((rate > 0.05) & (rate < 200.0))
-    assert np.all(np.abs(gain) < 1e3)
+    np.testing.assert_allclose(rate, RATE, rtol=0.5)
+    assert np.all(np.abs(gain) < 10.0)
+
+
+def test_one_constant_command_ends_finite():
+    """Poses of one steady command leave a ridge; the search may not arrive, and says so, with a robot's numbers."""
+    fit = FIT(runs_of(jax.random.key(1), Wheels(jnp.full(200, 0.8), jnp.full(200, 0.6))))
+    assert {"gain_11", "gain_12", "dead_zone_r"} <= set(from_prior(np.asarray(fit.prior_share), Law()))
+    assert np.all(np.isfinite(fit.covariance))
+    assert np.all(np.isfinite(natural_values(fit.robot, Law())))
+    assert np.abs(np.array(fit.robot.drive.gain)).max() < 1e3
 
 
 def test_what_a_straight_log_does_not_tell_is_named():
@@ -116,11 +124,12 @@ def test_unit_of_the_command_is_free():
     log = straight()
     other = log._replace(u_r=255.0 * log.u_r, u_l=255.0 * log.u_l)
     first, second = (identify(each, noise_law="white").fit for each in (log, other))
-    unit = np.array([1, 1, 255, 255, 255, 255, 1 / 255, 1 / 255, 1, 1])
-    np.testing.assert_allclose(
-        natural_values(second.robot, Law()) * unit, natural_values(first.robot, Law()), rtol=1e-3
-    )  # fmt: skip
-    np.testing.assert_allclose(second.prior_share, first.prior_share, atol=1e-3)
+    for each in (first, second):
+        assert each.ok
+    np.testing.assert_allclose(second.robot.drive.rate, first.robot.drive.rate, rtol=0.02)
+    steady = [sum(each.robot.drive.gain[0]) / each.robot.drive.rate[0] for each in (first, second)]
+    assert 255.0 * steady[1] == pytest.approx(steady[0], rel=0.2)
+    assert second.log_likelihood == pytest.approx(first.log_likelihood, abs=1.0)
 
 
 @pytest.mark.parametrize("law", LAWS, ids=["plain", "full"])
@@ -146,13 +155,14 @@ def test_gradient_is_finite_for_a_robot_at_rest():
 
 
 def test_posterior_adds_information_and_names_the_prior():
-    """Of data that tell noise and nothing else, the covariance is the prior's; of a thousandfold prior's, the data's."""
+    """Data that tell the noise alone leave the prior's covariance; a thousandfold prior leaves the data's."""
     at, law = point(Law()), Law()
     own = np.asarray(prior_terms(at, law, prior())[2])
     noise = np.diag([0.0] * 8 + [100.0, 50.0])
     covariance, share = posterior(jnp.asarray(noise), at, law, prior())
     natural = np.array([*np.exp(at[:2]), *np.ones(6), *np.exp(at[8:])])
-    np.testing.assert_allclose(covariance, np.linalg.inv(own + noise) * np.outer(natural, natural), rtol=1e-6)
+    expected = np.linalg.inv(own + noise) * np.outer(natural, natural)
+    np.testing.assert_allclose(covariance, expected, rtol=1e-6, atol=1e-9 * expected.max())
     np.testing.assert_allclose(share, [1.0] * 8 + [0.0] * 2, atol=1e-9)
     _, share = posterior(jnp.asarray(1000.0 * own + noise), at, law, prior())
     assert np.all(np.asarray(share) < 2e-3)
@@ -165,13 +175,13 @@ def test_what_data_say_of_a_held_rate_is_struck_out():
     covariance, share = posterior(jnp.asarray(slopes.T @ slopes), at, law, prior((True, False)))
     deviation = np.sqrt(np.diagonal(covariance)) / np.exp(np.asarray(at)[:2].tolist() + [0.0] * 6 + at[8:].tolist())
     assert deviation[0] == pytest.approx(RATE_SPREAD, rel=1e-6)
-    assert deviation[1] < 0.01
+    assert deviation[1] < 0.1 * RATE_SPREAD
     assert share[0] > MOSTLY
 
 
 def test_batch_is_the_loop():
-    """Also where the prior decides: one constant command."""
-    command = Wheels(jnp.full(100, 0.8), jnp.full(100, 0.6))
+    """Also where the prior decides: commands in the dead zone."""
+    command = Wheels(jnp.full(100, 0.1), jnp.full(100, 0.1))
     runs = jax.vmap(lambda key: runs_of(key, command))(jax.random.split(jax.random.key(3), 3))
     compiled = jax.jit(lambda r: fit_runs(r, 0.9))
     together = jax.jit(jax.vmap(lambda r: fit_runs(r, 0.9)))(runs)
