@@ -41,7 +41,7 @@ FULL = Model(
     ),
     covariance=draw(3, 3) @ draw(3, 3).T,
     parameter_order=("rate_v", "rate_w", "D_r"),
-    provenance=Provenance("0.1.0", "maximum-likelihood", ("a.csv", "b.csv"), 7),
+    provenance=Provenance("0.1.0", "maximum-likelihood", ("a.csv", "b.csv"), 7, from_prior=("rate_1",)),
 )
 
 

@@ -38,7 +38,8 @@ def test_page_holds_parameters_doubts_tests_and_pictures(tmp_path):
     (path,) = write_identification(found, logs, VERDICTS, tmp_path / "page.html")
     text = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert path == str(tmp_path / "page.html")
-    for words in ("1 of 2 numbers are determined", "not determined: this input moves", "The heading is odd.", "white"):
+    assert "from the prior: this log" not in text
+    for words in ("1 of 2 numbers are determined;", "not determined: this input moves", "The heading is odd.", "white"):
         assert words in text
     assert text.count("<img") == 4
     write_identification(found._replace(suspicions=(), ok=False), logs, VERDICTS, tmp_path / "page.html")
@@ -60,3 +61,12 @@ def test_the_papers_method_has_no_page(tmp_path):
     found, logs = made()
     with pytest.raises(InputError, match="maximum likelihood"):
         write_identification(found._replace(fit=None), logs, VERDICTS, tmp_path / "page.html")
+
+
+def test_page_names_what_comes_from_the_prior(tmp_path):
+    found, logs = made()
+    lent = [VERDICTS[0]._replace(verdict="from the prior", reason="this log hardly tells it"), VERDICTS[1]]
+    write_identification(found, logs, lent, tmp_path / "page.html")
+    text = (tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "0 of 2 numbers are determined, 1 come from the prior;" in text
+    assert "from the prior: this log hardly tells it" in text
