@@ -1,9 +1,10 @@
 """Confidence intervals of what is counted and measured over cases."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 NORMAL_95 = 1.959963984540054
 DRAWS = 4000
@@ -19,7 +20,7 @@ def wilson(hits: int, count: int, z: float = NORMAL_95) -> tuple[float, float]:
     return max(centre - half, 0.0), min(centre + half, 1.0)
 
 
-def bootstrap(values: Sequence, statistic: Callable[[np.ndarray], float], seed: int = 0) -> tuple[float, float]:
+def bootstrap(values: ArrayLike, statistic: Callable[[np.ndarray], float], seed: int = 0) -> tuple[float, float]:
     """The 95 % percentile interval of a statistic over cases drawn again with replacement; NaN for no cases."""
     values = np.asarray(values, float)
     if len(values) == 0:

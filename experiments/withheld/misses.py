@@ -34,8 +34,8 @@ def wrong(marks: dict[str, Any]) -> list[str]:
         "site": marks["site"] is False,
         "channel": marks["channel"] is False,
         "claimed": marks["kind"] == "none" and marks["claimed"],
-        "nothing unexplained": marks["kind"] == "outside" and not marks["unexplained"],
-        "unexplained": marks["kind"] in ("single", "pair") and marks["unexplained"],
+        "nothing unexplained": marks["kind"] in ("outside", "mixed") and not marks["unexplained"],
+        "unexplained": marks["kind"] in ("single", "pair", "many") and marks["unexplained"],
     }
     words = [word for word, missed in found.items() if missed]
     low, high = marks.get("interval") or (None, None)
