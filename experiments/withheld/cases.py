@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxident.effects import CATALOGUE
 
-from . import batch_robot, robots
+from . import batch_robot, outside, robots
 from .batch_camera import frozen
 
 SCHEMA = "withheld.answers/1"
@@ -49,8 +49,8 @@ def describe(
         if other and name in robots.FORMS:
             parameters["form"] = robots.form(name, parameters, session)
         effects.append({"name": name, "parameters": parameters, "sites": sites(name)})
-    outside = {"outside": [name for name in names if name not in CATALOGUE]} if kind == "mixed" else {}
-    return outside | {
+    unlisted = {"outside": [name for name in names if name not in CATALOGUE]} if kind == "mixed" else {}
+    return unlisted | {
         "generator": "batch",
         "seed": seed,
         "kind": kind,
@@ -70,7 +70,7 @@ def describe(
 
 def sites(name: str) -> list[str]:
     """Where an effect acts, in or outside the catalogue."""
-    return [CATALOGUE[name].site] if name in CATALOGUE else list(robots.OUTSIDE_SITES[name])
+    return [CATALOGUE[name].site] if name in CATALOGUE else list((outside.SITES | outside.LATER_SITES)[name])
 
 
 def channels(name: str) -> tuple[str, ...]:

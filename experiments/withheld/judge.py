@@ -15,7 +15,7 @@ from .marks import mark
 from .misses import misses
 from .score import table
 
-RANDOM = ("coloured_noise", "outliers", "frozen_frames", "lost_commands")
+RANDOM = ("coloured_noise", "outliers", "frozen_frames", "lost_commands", "bumps")
 """Effects of chance: they leave nothing to shrink on runs without it."""
 
 

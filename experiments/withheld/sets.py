@@ -5,7 +5,8 @@ import numpy as np
 from jaxident.effects import CATALOGUE
 
 from .cases import describe, simulate_cases
-from .robots import FORMS, OUTSIDE_SITES
+from .outside import LATER_SITES, SITES
+from .robots import FORMS
 
 COUNTS = {
     "trial": {"none": 1, "single": 1, "pair": 1, "outside": 1},
@@ -27,6 +28,8 @@ MANY = (4, 5)
 """Effects of a case of the kind `many`: one of these counts, each as likely as the other."""
 SINGLE_FRAMES = ("outliers", "frozen_frames")
 """Effects of pure chance on single frames: not among those of `many`."""
+WITH_LATER = ("sealed_second",)
+"""Sets that have the later effects of no catalogue (`outside.LATER_SITES`) as well."""
 
 FORWARD = 0.06
 """Share of sealed cases whose input is two forward levels."""
@@ -63,8 +66,9 @@ def _engine_cases(rng, name: str) -> list[dict]:
 def _batch_cases(rng, name: str) -> list[dict]:
     cases = []
     listed = list(FORMS) if name == "forms" else list(CATALOGUE)
+    unlisted = list(SITES | LATER_SITES if name in WITH_LATER else SITES)
     for kind, count in COUNTS[name].items():
-        for number, names in enumerate(names_of_kind(rng, kind, count, listed, list(OUTSIDE_SITES))):
+        for number, names in enumerate(names_of_kind(rng, kind, count, listed, unlisted)):
             sim = rng.choice(["same", "near"]) if rng.random() < 1 / 3 else None
             slip = number % 2 == 1 if kind == "none" else rng.random() < 0.5
             forward = name.startswith("sealed") and rng.random() < FORWARD

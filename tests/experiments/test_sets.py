@@ -6,7 +6,7 @@ import pathlib
 import numpy as np
 import pytest
 from withheld.cases import LATER_FORMAT, write_answers
-from withheld.robots import OUTSIDE_SITES
+from withheld.outside import LATER_SITES, SITES
 from withheld.sets import COUNTS, SINGLE_FRAMES, draw_set, names_of_kind
 
 from jaxident.effects import CATALOGUE
@@ -45,7 +45,7 @@ def test_a_set_has_its_counts(drawn):
 
 
 def test_many_are_four_or_five_of_the_catalogue():
-    cases = names_of_kind(np.random.default_rng(1), "many", 60, list(CATALOGUE), list(OUTSIDE_SITES))
+    cases = names_of_kind(np.random.default_rng(1), "many", 60, list(CATALOGUE), list(SITES))
     assert {len(names) for names in cases} == {4, 5}
     assert all(len(set(names)) == len(names) for names in cases)
     assert {name for names in cases for name in names} == CATALOGUE.keys() - set(SINGLE_FRAMES)
@@ -58,10 +58,19 @@ def test_mixed_is_one_of_the_catalogue_beside_one_outside(drawn):
         assert case["accepted"] == [[known]]
         assert known in CATALOGUE
         assert case["outside"] == [unknown]
-        assert unknown in OUTSIDE_SITES
-    assert {case["outside"][0] for case in mixed} == OUTSIDE_SITES.keys()  # 14 cases, seven effects
+        assert unknown in SITES
+    assert {case["outside"][0] for case in mixed} == SITES.keys()  # 14 cases, seven effects
 
 
 def test_further_kinds_are_told_in_the_answers(drawn, tmp_path):
     write_answers(tmp_path / "answers.json", {"case_001": next(case for case in drawn if case["kind"] == "mixed")})
     assert LATER_FORMAT["outside"] in (tmp_path / "answers.json").read_text()
+
+
+def test_later_effects_are_in_later_sets_alone(drawn):
+    """20 cases outside and 20 mixed, of 13 effects: every one is drawn in each kind."""
+    second = draw_set("sealed_second", 7)
+    for kind in ("outside", "mixed"):
+        names = {effect["name"] for case in second if case["kind"] == kind for effect in case["effects"]}
+        assert names - CATALOGUE.keys() == SITES.keys() | LATER_SITES.keys()
+    assert not {effect["name"] for case in drawn for effect in case["effects"]} & LATER_SITES.keys()
