@@ -89,12 +89,9 @@ def test_later_effects_at_nought_are_nothing():
 
 
 def test_castors_kick_after_a_reversal_alone():
-    """Straight ahead, back at row 15: the heading stays until the robot rolls back, and then turns to the kick's side."""
-    straight = ROBOT | {
-        "gain": np.array([[0.4, 0.4], [24.0, -24.0]]),
-        "coupling": np.zeros(2),
-        "dead_zone": np.zeros(2),
-    }
+    """Straight ahead, back at row 15: the heading stays until the robot rolls back, then turns to the kick's side."""
+    straight = ROBOT | {"gain": np.array([[0.4, 0.4], [24.0, -24.0]]), "dead_zone": np.zeros(2)}
+    straight["coupling"] = np.zeros(2)
     command = np.where(np.arange(ROWS) < 15, 0.8, -0.8)[:, None, None] * np.ones((1, 2))
     found = simulate(
         [straight], [{"castor_kick": {"kick": 4.0, "fade": 0.2}}], np.array([PERIOD]), command, START[None], np.zeros(1)
