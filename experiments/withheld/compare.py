@@ -2,9 +2,10 @@
 
     python -m experiments.withheld.compare --answers ANSWERS --found before=FOLDER after=FOLDER --out OUT [--quick]
 
-Both columns of a row are taken over the cases that bear on it in both. The interval of the difference is the
-bootstrap's over these cases, drawn in pairs: a hard case is hard for both. Cases that one of them has not come to yet
-are left out. OUT/comparison.md also lists the cases that came out otherwise. Answers must be plain.
+Both columns of a row are taken over the cases that bear on it in both. The 95 % interval of the difference knows that
+they are the same cases, and a hard case is hard for both: of shares it is Agresti's and Min's, of all else the
+bootstrap's over cases drawn in pairs. Cases that one of them has not come to yet are left out. OUT/comparison.md also
+lists the cases that came out otherwise. Answers must be plain.
 """
 
 import argparse
@@ -17,7 +18,7 @@ import numpy as np
 
 import jaxident as ji
 
-from .intervals import bootstrap
+from .intervals import bootstrap, matched
 from .judge import added, marked
 from .misses import hidden_of, said_of, wrong
 from .rows import ROWS, Row
@@ -38,12 +39,9 @@ def paired(row: Row, first: list[dict], second: list[dict]) -> dict[str, Any]:
         return float(row.statistic(other[cases]) - row.statistic(one[cases]))
 
     every = np.arange(len(both))
-    values = {
-        "first": float(row.statistic(one)),
-        "second": float(row.statistic(other)),
-        "difference": difference(every),
-    }
-    return told | values | {"interval": list(bootstrap(every, difference)), "cases": len(both), "goal": row.goal}
+    told |= {"first": float(row.statistic(one)), "second": float(row.statistic(other)), "difference": difference(every)}
+    interval = matched(one, other) if row.counted else bootstrap(every, difference)
+    return told | {"interval": list(interval), "cases": len(both), "goal": row.goal}
 
 
 def compared(first: list[dict], second: list[dict]) -> list[dict[str, Any]]:

@@ -28,3 +28,13 @@ def bootstrap(values: ArrayLike, statistic: Callable[[np.ndarray], float], seed:
     rng = np.random.default_rng(seed)
     drawn = [statistic(values[rng.integers(len(values), size=len(values))]) for _ in range(DRAWS)]
     return tuple(float(q) for q in np.quantile(drawn, [0.025, 0.975]))  # type: ignore[return-value]
+
+
+def matched(first: np.ndarray, second: np.ndarray, z: float = NORMAL_95) -> tuple[float, float]:
+    """The 95 % interval of the difference of two shares of the same cases, Agresti and Min 2005: half a case more in
+    each cell of the table of pairs, so that no difference in few cases is not taken for none at all."""
+    gained, lost = (float(np.sum(a > b) + 0.5) for a, b in ((second, first), (first, second)))
+    count = len(first) + 2.0
+    centre = (gained - lost) / count
+    half = z * math.sqrt(gained + lost - (gained - lost) ** 2 / count) / count
+    return max(centre - half, -1.0), min(centre + half, 1.0)

@@ -40,8 +40,8 @@ def telling(*kinds: str) -> Callable[[dict], bool]:
 
 
 def has(*keys: str) -> Callable[[dict], bool]:
-    """Cases that know these marks."""
-    return lambda m: all(m.get(key) not in (None, []) for key in keys)
+    """Cases that know these marks; an empty list is not known."""
+    return lambda m: not any(m.get(key) is None or (isinstance(m[key], list) and not m[key]) for key in keys)
 
 
 def both(*conditions: Callable[[dict], bool]) -> Callable[[dict], bool]:

@@ -75,7 +75,7 @@ def test_many_count_effects_and_mixed_count_cases():
 
 
 def test_the_worst_tenth_of_the_shrink():
-    given = [mark for k in range(11) for mark in marks("many" if k % 2 else "pair", 1, shrink=k / 10)]
+    given = [mark for k in range(11) for mark in marks("many" if k % 2 else "pair", 1, shrink=np.float64(k / 10))]
     given += marks("mixed", 1, shrink=np.nan) + marks("mixed", 1, shrink=-50.0)
     rows = rows_of(given)
     assert rows["shrink achieved over achievable, worst tenth"]["value"] == pytest.approx(0.1)
