@@ -110,6 +110,8 @@ ERRORS = (
     shrink(f"outside the catalogue: {SHRINK}, median", "outside", goal="0.8"),
     Row("shrink inside its 90 % interval", both(kind(*CATALOGUED), has("shrink", "interval")), _held, np.mean,
         "0.85 to 0.95", True),
+    Row(f"{MIXED}: shrink inside its 90 % interval", both(kind("mixed"), has("shrink", "interval")), _held, np.mean,
+        "0.85 to 0.95", True),
     Row("true share of an effect inside its 90 % interval", has("shares"),
         lambda m: (sum(m["shares"]), len(m["shares"])), ratio, "0.85 to 0.95"),
     Row(f"{PROMISE}: 0.75 to 1.33", has("promise"), lambda m: float(LOW < m["promise"] < HIGH), np.mean,
