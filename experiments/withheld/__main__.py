@@ -12,7 +12,7 @@ from . import baselines, seal
 from .collect import collect
 from .diagnose import DEFAULT, diagnose
 from .draw import draw
-from .judge import judge
+from .judge import added, judge
 from .sets import COUNTS
 
 
@@ -51,7 +51,7 @@ def _score(options) -> None:
     if options.partial:
         first = next(iter(found.values()))
         answers = {name: answer for name, answer in answers.items() if (first / name / "process.json").exists()}
-    judge(answers, found, options.out, not options.quick)
+    judge(answers, found, options.out, not options.quick, added(answers, options.shares, options.promise))
 
 
 def _all(options) -> None:
@@ -109,6 +109,8 @@ def _parser() -> argparse.ArgumentParser:
     one.add_argument("--sealed", **path)
     one.add_argument("--key", **path)
     one.add_argument("--quick", action="store_true", help="without the shrink on fresh runs")
+    one.add_argument("--shares", **path, help="what `shares` wrote for the first method")
+    one.add_argument("--promise", **path, help="what `promise` wrote for the first method")
     one.add_argument("--partial", action="store_true", help="leave out cases that the first method has not come to yet")
     one = step("all", _all, "everything in one go; what was drawn or diagnosed in OUT is kept", "out")
     one.add_argument("--set", nargs="+", choices=COUNTS, default=["sealed", "sealed_engine"])

@@ -3,11 +3,12 @@
 Shares no code with the package. The forms are those of `jaxident effects`; the integrator is another: Runge-Kutta
 over substeps of held drive, and dry friction as an implicit projection (Moreau's time stepping) instead of events.
 Most effects have another form as well, where their parameter `form` is not zero (`robots.FORMS`): a robot's drag need
-not be quadratic. `OUTSIDE` are effects that no catalogue lists.
+not be quadratic. `OUTSIDE` are effects that no catalogue lists; later ones are in `batch_outside.py`.
 """
 
 import numpy as np
 
+from . import batch_outside as outside
 from .batch_camera import report
 from .batch_input import arriving, delays, pair, pushed, sent_commands
 
@@ -47,18 +48,21 @@ OUTSIDE: dict[str, dict[str, float]] = {
 }
 
 
-MEMORY = ("command", "play", "lag", "second lag", "friction", "angle", "heat")
+MEMORY = ("command", "play", "lag", "second lag", "friction", "angle", "heat", *outside.MEMORY)
 """What a robot remembers of both wheels."""
 
 
 def columns(effects: list[dict]) -> dict[str, dict[str, np.ndarray]]:
-    """Every parameter of every effect as an array (runs,), neutral where a run has not that effect."""
+    """Every parameter of every effect as an array (runs,), neutral where a run has not that effect. Later effects of no
+    catalogue are left out where no run has them."""
+    had = {name for run in effects for name in run}
+    late = {name: law for name, law in outside.LATER.items() if name in had}
     return {
         name: {
             key: np.array([run.get(name, {}).get(key, neutral) for run in effects], float)
             for key, neutral in {"form": 0.0, **parameters}.items()
         }
-        for name, parameters in (NEUTRAL | OUTSIDE).items()
+        for name, parameters in (NEUTRAL | OUTSIDE | late).items()
     }
 
 
@@ -81,12 +85,13 @@ def simulate(robots, effects, period, u, start, session_time, slip=None, rngs=No
     memory = {key: np.zeros((runs, 2)) for key in MEMORY}
     poses = np.zeros((rows, runs, 3))
     poses[0] = state[:3].T
+    shoves = outside.bumped(p, period, np.zeros((rows, runs, 2)) if slip is None else slip, rngs)
     for row in range(rows - 1):
-        shove = np.zeros((runs, 2)) if slip is None else slip[row]
-        targets = arriving(sent, row, delay[row], substeps)
+        shove = shoves[row]
+        targets = arriving(sent, row, delay[row] + outside.later(p, robot, state, period), substeps)
         for j in range(substeps):
             time = session_time + row * period + (j + 0.5) * h
-            drive = pushed(p, robot, memory, targets[j], time, h)
+            drive = outside.braked(p, robot, state, pushed(p, robot, memory, targets[j], time, h))
             state = substep(p, robot, memory, state, drive, shove, time, h)
         poses[row + 1] = state[:3].T
     return report(effects, period, poses, rngs)
@@ -106,6 +111,7 @@ def stack(robots) -> dict[str, np.ndarray]:
 def substep(p, robot, memory, state, drive, shove, time, h):
     """State (5, runs) one substep later; the friction of the substep before is held, then corrected."""
     light = lightness(p["payload_change"], time)
+    shove = shove + outside.shoved(p, robot, memory, state, light, time)
     rub = np.einsum("nij,nj->ni", robot["gain"], memory["friction"]) * light[:, None]
 
     def slope(s):
@@ -122,6 +128,7 @@ def substep(p, robot, memory, state, drive, shove, time, h):
     new[3:] = corrected
     n = np.einsum("nij,jn->ni", robot["to_n"], new[3:])
     memory["angle"] = memory["angle"] + p["wheel_eccentricity"]["turns"][:, None] * n * h[:, None]
+    outside.remember(p, robot, memory, new, h)
     return new
 
 

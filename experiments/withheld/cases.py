@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxident.effects import CATALOGUE
 
-from . import batch_robot, robots
+from . import batch_robot, outside, robots
 from .batch_camera import frozen
 
 SCHEMA = "withheld.answers/1"
@@ -27,6 +27,12 @@ FORMAT = {
     "generator": "batch (equations) or engine (MuJoCo)",
     "seed": "of this case: generator and this entry repeat the logs",
 }
+LATER_FORMAT = {
+    "kind": "none, single, pair, many (four or five effects of the catalogue), outside (an effect that no catalogue "
+    "lists, alone) or mixed (one of the catalogue beside one that none lists)",
+    "outside": "of a mixed case: names of the effects that no catalogue lists",
+}
+"""What further kinds change in FORMAT. The first kinds keep theirs, which is part of what was sealed."""
 
 
 def describe(
@@ -43,7 +49,8 @@ def describe(
         if other and name in robots.FORMS:
             parameters["form"] = robots.form(name, parameters, session)
         effects.append({"name": name, "parameters": parameters, "sites": sites(name)})
-    return {
+    unlisted = {"outside": [name for name in names if name not in CATALOGUE]} if kind == "mixed" else {}
+    return unlisted | {
         "generator": "batch",
         "seed": seed,
         "kind": kind,
@@ -63,7 +70,7 @@ def describe(
 
 def sites(name: str) -> list[str]:
     """Where an effect acts, in or outside the catalogue."""
-    return [CATALOGUE[name].site] if name in CATALOGUE else list(robots.OUTSIDE_SITES[name])
+    return [CATALOGUE[name].site] if name in CATALOGUE else list((outside.SITES | outside.LATER_SITES)[name])
 
 
 def channels(name: str) -> tuple[str, ...]:
@@ -158,5 +165,7 @@ def write_case(folder: pathlib.Path, logs: list[np.ndarray]) -> None:
 
 def write_answers(path: pathlib.Path, cases: dict[str, dict]) -> None:
     """The answers of all cases, with what their keys mean."""
-    text = json.dumps({"schema": SCHEMA, "format": FORMAT, "cases": cases}, indent=1, sort_keys=True)
+    later = any(case["kind"] in ("many", "mixed") for case in cases.values())
+    meanings = FORMAT | LATER_FORMAT if later else FORMAT
+    text = json.dumps({"schema": SCHEMA, "format": meanings, "cases": cases}, indent=1, sort_keys=True)
     path.write_text(text + "\n")

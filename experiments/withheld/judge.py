@@ -9,23 +9,29 @@ import numpy as np
 import jaxident as ji
 
 from . import picture
+from .calibration import claims
 from .fresh import fresh_runs, true_shrink
 from .marks import mark
 from .misses import misses
 from .score import table
 
-RANDOM = ("coloured_noise", "outliers", "frozen_frames", "lost_commands")
-"""Effects that leave nothing to shrink on runs without chance."""
+RANDOM = ("coloured_noise", "outliers", "frozen_frames", "lost_commands", "bumps")
+"""Effects of chance: they leave nothing to shrink on runs without it."""
 
 
-def judge(answers: dict[str, dict], folders: dict[str, pathlib.Path], out: pathlib.Path, shrink: bool = True) -> dict:
-    """Tables by generator and method; folders: that of each method's diagnoses, ours first. Writes OUT/scores.json,
-    table.md, misses.md of the first method, and pictures."""
+def judge(
+    answers: dict[str, dict],
+    folders: dict[str, pathlib.Path],
+    out: pathlib.Path,
+    shrink: bool = True,
+    more: dict[str, dict] | None = None,
+) -> dict:
+    """Tables by generator and method; folders: that of each method's diagnoses, ours first; more: further marks by case
+    of the first method (`added`). Writes OUT/scores.json, table.md, misses.md of the first method, and pictures."""
     out.mkdir(parents=True, exist_ok=True)
-    marks = {
-        method: {name: one(answer, folder / name, shrink) for name, answer in answers.items()}
-        for method, folder in folders.items()
-    }
+    marks = {method: marked(answers, folder, shrink) for method, folder in folders.items()}
+    for name, further in (more or {}).items():
+        next(iter(marks.values()))[name] |= further
     kinds = sorted({answer["generator"] for answer in answers.values()})
     tables, pages = {}, []
     for kind in kinds:
@@ -41,24 +47,50 @@ def judge(answers: dict[str, dict], folders: dict[str, pathlib.Path], out: pathl
     return tables
 
 
+def marked(answers: dict[str, dict], folder: pathlib.Path, shrink: bool = True) -> dict[str, dict[str, Any]]:
+    """The marks of every case of one folder."""
+    return {name: one(answer, folder / name, shrink) for name, answer in answers.items()}
+
+
+def added(names, shares: pathlib.Path | None, promise: pathlib.Path | None) -> dict[str, dict[str, Any]]:
+    """Further marks of these cases from what `shares` and `promise` wrote. shares: whether each true share is inside
+    its interval; promise: error on fresh runs over that promised."""
+    further: dict[str, dict[str, Any]] = {name: {} for name in names}
+    for name, case in _read(shares).items():
+        if name in further:
+            rows = case["rows"]
+            further[name]["shares"] = [row["interval"][0] <= row["true"] <= row["interval"][1] for row in rows]
+    for name, case in _read(promise).items():
+        if name in further:
+            further[name]["promise"] = case["fresh"] / case["promised"]
+    return further
+
+
+def _read(path: pathlib.Path | None) -> dict:
+    return {} if path is None else json.loads(path.read_text())
+
+
 def one(answer: dict, folder: pathlib.Path, shrink: bool) -> dict[str, Any]:
     """The marks of one case; a case without a diagnosis is marked as failed."""
     path, record = folder / "diagnosis.json", folder / "process.json"
     diagnosis = json.loads(path.read_text()) if path.exists() else None
     found = mark(answer, diagnosis) | {"strength": answer["strength"], "inputs": answer["inputs"]}
+    found["claims"] = claims(answer, diagnosis)
+    given = (diagnosis or {}).get("probability") or {}
+    outside = answer["kind"] in ("outside", "mixed")
+    found["unexplained_top"] = [given["unexplained"], outside] if "unexplained" in given else None
     found["seconds"] = json.loads(record.read_text())["seconds"] if record.exists() else None
     gap = (diagnosis or {}).get("gap") or {}
     found["interval"] = gap.get("shrink_interval")
-    if shrink and diagnosis and listed(answer) and (folder / "corrected_model.json").exists():
+    if shrink and diagnosis and shrinkable(answer) and (folder / "corrected_model.json").exists():
         models = [ji.load_model(folder / f"{name}_model.json") for name in ("nominal", "corrected")]
         found["shrink"] = true_shrink(answer, *models, gap["horizon"], fresh_runs(answer))["shrink"]
     return found
 
 
-def listed(answer: dict) -> bool:
-    """Whether the shrink of a case has meaning: effects of the catalogue that are there without chance."""
-    names = [effect["name"] for effect in answer["effects"]]
-    return answer["kind"] in ("single", "pair") and not any(name in RANDOM for name in names)
+def shrinkable(answer: dict) -> bool:
+    """Whether the shrink of a case has meaning: an effect is there without chance."""
+    return any(effect["name"] not in RANDOM for effect in answer["effects"])
 
 
 def draw(answers: dict[str, dict], marks: dict[str, dict], out: pathlib.Path, label: str) -> None:

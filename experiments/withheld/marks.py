@@ -12,17 +12,19 @@ def mark(answer: dict, diagnosis: dict | None) -> dict[str, Any]:
 
     claimed: a gap beyond parameters is claimed. unexplained: something is told that no named effect covers, apart from
     the names. right: the hidden set is named, no more and no less, where a name also stands for those said to be
-    indistinguishable from it. strict: the same without them. some: at least one hidden effect is named. site, channel:
-    the most probable site, the channel of most excess, are among the right ones. top: probability of the most probable
-    set, or outside the catalogue that something is unexplained, and whether that is the truth.
+    indistinguishable from it. strict: the same without them. some: at least one hidden effect is named. named: how many
+    of the `hidden` ones of the catalogue are, each by a name of its own. extras: how many names are right for none.
+    site, channel: the most probable site, the channel of most excess, are among the right ones. top: probability of the
+    most probable set, or outside the catalogue that something is unexplained, and whether that is the truth.
     """
     if diagnosis is None:
         diagnosis = {"verdict": "failed"}
     selected, likeness = diagnosis.get("selected") or [], look_alikes(diagnosis)
     kind, accepted = answer["kind"], answer["accepted"]
-    listed = kind in ("single", "pair")
+    listed = bool(accepted)
     effects = diagnosis["verdict"] in NAMING
     alike = [{name, *likeness.get(name, ())} for name in selected]
+    wrong = sum(not touches(accepted, each) for each in alike) if effects else 0
     return {
         "kind": kind,
         "verdict": diagnosis["verdict"],
@@ -32,10 +34,13 @@ def mark(answer: dict, diagnosis: dict | None) -> dict[str, Any]:
         "right": bool(effects and covers(accepted, alike)) if listed else None,
         "strict": bool(effects and covers(accepted, [{name} for name in selected])) if listed else None,
         "some": bool(effects and any(set(names) & each for names in accepted for each in alike)) if listed else None,
-        "extra": bool(effects and any(not touches(accepted, each) for each in alike)) if listed else None,
+        "extra": wrong > 0 if listed else None,
+        "hidden": len(accepted),
+        "named": found_of(accepted, alike) if effects else 0,
+        "extras": wrong,
         "set_size": max(map(len, alike), default=0),
         "site": _among(_largest(diagnosis, "site"), [s for e in answer["effects"] for s in e["sites"]]),
-        "channel": _among(_largest(diagnosis, "channels"), answer["channels"]),
+        "channel": _among(_largest(diagnosis, "channels"), [] if kind == "mixed" else answer["channels"]),
         "top": top(answer, diagnosis, likeness),
         "probability_of_truth": probability_of_truth(answer, diagnosis, likeness),
     }
@@ -49,6 +54,15 @@ def look_alikes(diagnosis: dict) -> dict[str, list[str]]:
 def touches(accepted: list[list[str]], names: set[str]) -> bool:
     """Whether one of the names is right for one of the hidden effects."""
     return any(set(right) & names for right in accepted)
+
+
+def found_of(accepted: list[list[str]], found: list[set[str]]) -> int:
+    """How many hidden effects are found at most, each by a name of its own."""
+    if not accepted:
+        return 0
+    first, rest = set(accepted[0]), accepted[1:]
+    by = [1 + found_of(rest, found[:k] + found[k + 1 :]) for k, names in enumerate(found) if first & names]
+    return max([found_of(rest, found), *by])
 
 
 def covers(accepted: list[list[str]], found: list[set[str]]) -> bool:

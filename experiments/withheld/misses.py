@@ -12,19 +12,28 @@ def misses(answers: dict[str, dict], marks: dict[str, dict]) -> str:
         answer, own = answers[name], marks[name]
         found = wrong(own)
         if found:
-            effects = zip(answer["effects"], answer["strength"], strict=True)
-            hidden = ", ".join(f"{effect['name']} ({strength:.2f})" for effect, strength in effects)
             cells = (
                 name.removeprefix("case_"),
                 own["kind"],
-                hidden,
+                hidden_of(answer),
                 "yes" if answer.get("slip") else "",
                 answer["inputs"],
-                ", ".join(own["selected"]) or own["verdict"],
+                said_of(own),
                 ", ".join(found),
             )
             rows.append(f"| {' | '.join(cells)} |")
     return "\n".join(rows) + "\n"
+
+
+def hidden_of(answer: dict) -> str:
+    """The hidden effects and their strengths."""
+    effects = zip(answer["effects"], answer["strength"], strict=True)
+    return ", ".join(f"{effect['name']} ({strength:.2f})" for effect, strength in effects)
+
+
+def said_of(marks: dict[str, Any]) -> str:
+    """The effects named, or else the verdict."""
+    return ", ".join(marks["selected"]) or marks["verdict"]
 
 
 def wrong(marks: dict[str, Any]) -> list[str]:
@@ -34,8 +43,8 @@ def wrong(marks: dict[str, Any]) -> list[str]:
         "site": marks["site"] is False,
         "channel": marks["channel"] is False,
         "claimed": marks["kind"] == "none" and marks["claimed"],
-        "nothing unexplained": marks["kind"] == "outside" and not marks["unexplained"],
-        "unexplained": marks["kind"] in ("single", "pair") and marks["unexplained"],
+        "nothing unexplained": marks["kind"] in ("outside", "mixed") and not marks["unexplained"],
+        "unexplained": marks["kind"] in ("single", "pair", "many") and marks["unexplained"],
     }
     words = [word for word, missed in found.items() if missed]
     low, high = marks.get("interval") or (None, None)

@@ -8,9 +8,9 @@ import numpy as np
 import jaxident as ji
 from jaxident.effects import CATALOGUE
 
+from .calibration import reliability
 from .intervals import wilson
 from .marks import NAMING
-from .score import reliability
 
 VERDICTS = ("no_gap", "parameters", "unknown", "undecided", "failed")
 

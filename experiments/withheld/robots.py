@@ -6,6 +6,8 @@
 
 import numpy as np
 
+from .outside import LATER_LAWS
+
 PERIODS = (0.02, 1.0 / 30.0, 0.04)
 FAINT, STRONG = 0.12, 0.7
 
@@ -191,6 +193,7 @@ LAWS = {
     "motor_heating": lambda rng, f, *_: {"loss": 3.0 * f, "time_constant": rng.uniform(3.0, 12.0)},
     "tether": lambda rng, f, robot, *_: {"pull": 1.5 * f * _full(robot)[0]},
     "heading_bias": lambda rng, f, *_: {"amplitude": 0.25 * f, "phase": rng.uniform(-np.pi, np.pi)},
+    **LATER_LAWS,
 }
 """Of every effect, in and outside the catalogue: (generator, strength, robot, noise, session) to parameters."""
 
@@ -230,15 +233,3 @@ def form(name: str, parameters: dict, session: float) -> float:
         "coloured_noise": 0.5,
     }  # fmt: skip
     return float(scales.get(name, 1.0))
-
-
-OUTSIDE_SITES = {
-    "cubic_input": ("actuation",),
-    "cross_drag": ("drive",),
-    "wheel_eccentricity": ("drive", "contact"),
-    "rough_patch": ("drive", "contact"),
-    "motor_heating": ("actuation", "drive", "time"),
-    "tether": ("drive", "contact"),
-    "heading_bias": ("camera",),
-}
-"""Where each effect outside the catalogue acts; several where the word is a matter of taste."""

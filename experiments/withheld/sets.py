@@ -5,7 +5,8 @@ import numpy as np
 from jaxident.effects import CATALOGUE
 
 from .cases import describe, simulate_cases
-from .robots import FORMS, OUTSIDE_SITES
+from .outside import LATER_SITES, SITES
+from .robots import FORMS
 
 COUNTS = {
     "trial": {"none": 1, "single": 1, "pair": 1, "outside": 1},
@@ -14,11 +15,21 @@ COUNTS = {
     "forms": {"single": 46, "pair": 30},
     "sealed": {"none": 80, "single": 145, "pair": 40, "outside": 40},
     "sealed_half": {"none": 40, "single": 73, "pair": 20, "outside": 20},
+    "development_many": {"many": 10, "mixed": 14, "none": 6, "outside": 6, "single": 6},
+    "sealed_second": {"none": 40, "single": 60, "pair": 20, "outside": 20, "many": 20, "mixed": 20},
     "engine": {"none": 5, "single": 15},
     "sealed_engine": {"none": 20, "single": 60, "pair": 20},
+    "sealed_engine_second": {"none": 10, "single": 30, "pair": 12},
 }
 """Cases of each kind in each set; those of the engine need the extra `mujoco`. `forms`: effects in other forms than the
 catalogue's."""
+
+MANY = (4, 5)
+"""Effects of a case of the kind `many`: one of these counts, each as likely as the other."""
+SINGLE_FRAMES = ("outliers", "frozen_frames")
+"""Effects of pure chance on single frames: not among those of `many`."""
+WITH_LATER = ("sealed_second",)
+"""Sets that have the later effects of no catalogue (`outside.LATER_SITES`) as well."""
 
 FORWARD = 0.06
 """Share of sealed cases whose input is two forward levels."""
@@ -54,10 +65,10 @@ def _engine_cases(rng, name: str) -> list[dict]:
 
 def _batch_cases(rng, name: str) -> list[dict]:
     cases = []
+    listed = list(FORMS) if name == "forms" else list(CATALOGUE)
+    unlisted = list(SITES | LATER_SITES if name in WITH_LATER else SITES)
     for kind, count in COUNTS[name].items():
-        listed = list(FORMS) if name == "forms" else list(CATALOGUE)
-        pool = list(OUTSIDE_SITES) if kind == "outside" else listed
-        for number, names in enumerate(hidden_names(rng, kind, count, pool)):
+        for number, names in enumerate(names_of_kind(rng, kind, count, listed, unlisted)):
             sim = rng.choice(["same", "near"]) if rng.random() < 1 / 3 else None
             slip = number % 2 == 1 if kind == "none" else rng.random() < 0.5
             forward = name.startswith("sealed") and rng.random() < FORWARD
@@ -65,6 +76,17 @@ def _batch_cases(rng, name: str) -> list[dict]:
             own = int(rng.integers(2**62))
             cases.append(describe(own, kind, names, slip=bool(slip), sim=sim, inputs=inputs, other=name == "forms"))
     return cases
+
+
+def names_of_kind(rng, kind: str, count: int, listed: list[str], outside: list[str]) -> list[list[str]]:
+    """Names of the hidden effects of each case; `mixed`: one that is listed, then one that is outside."""
+    if kind == "many":
+        pool = [name for name in listed if name not in SINGLE_FRAMES]
+        return [rng.choice(pool, rng.choice(MANY), replace=False).tolist() for _ in range(count)]
+    if kind == "mixed":
+        drawn = [hidden_names(rng, "single", count, pool) for pool in (listed, outside)]
+        return [known + unknown for known, unknown in zip(*drawn, strict=True)]
+    return hidden_names(rng, kind, count, outside if kind == "outside" else listed)
 
 
 def hidden_names(rng, kind: str, count: int, pool: list[str]) -> list[list[str]]:

@@ -118,7 +118,7 @@ def main() -> None:
     first, step = options.part
     for name in list(cases)[first::step]:
         path, case = options.found / name / "diagnosis.json", cases[name]
-        if not path.exists() or case["kind"] not in ("single", "pair"):
+        if not path.exists() or case["kind"] not in ("single", "pair", "many"):
             continue
         if not mark(case, json.loads(path.read_text()))["right"]:
             continue

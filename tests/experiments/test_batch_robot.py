@@ -5,6 +5,7 @@ import pytest
 from support.reference_effects import simulate_reference
 from withheld.batch_camera import disturbed, mapped
 from withheld.batch_input import BURST, happens
+from withheld.batch_outside import LATER, bumped
 from withheld.batch_robot import NEUTRAL, OUTSIDE, simulate
 from withheld.robots import FORMS, form
 
@@ -54,13 +55,61 @@ def test_a_column_is_the_reference(names, together):
 def test_no_certain_effect_is_missing():
     camera = {name for name, entry in CATALOGUE.items() if entry.site == "camera"}
     assert set(CATALOGUE) - camera == NEUTRAL.keys()
-    assert not (NEUTRAL | OUTSIDE).keys() & camera
+    assert not (NEUTRAL | OUTSIDE | LATER).keys() & camera
 
 
 def test_effects_outside_move_the_robot(together):
     sizes = {"cube": 0.3, "drag": 0.3, "right": 0.1, "turns": 30.0, "loss": 0.3, "pull": 0.3}
     moved = batch([{name: {key: sizes.get(key, value) for key, value in law.items()}} for name, law in OUTSIDE.items()])
     assert np.all(np.abs(moved - together[:, :1]).max(axis=(0, 2)) > 1e-3)
+
+
+LATE = {
+    "castor_kick": {"kick": 5.0}, "cogging": {"right": 0.1, "left": 0.1, "turns": 10.0},
+    "speed_dependent_delay": {"delay": 0.1}, "weak_braking": {"loss": 0.5},
+    "gusts": {"acceleration": 0.2, "every": 0.8}, "bumps": {"rate": 5.0, "along": 0.1, "heading": 1.0},
+}  # fmt: skip
+
+
+def test_later_effects_move_the_robot_and_no_other(together):
+    """Beside them a robot without any and one with a payload: bit by bit what they are without such neighbours."""
+    plain = [{}, {"payload_change": CATALOGUE["payload_change"].typical()}]
+    effects = [*({name: law} for name, law in LATE.items()), *plain]
+    moved = batch(effects, rngs=[np.random.default_rng(k) for k in range(len(effects))])
+    assert LATE.keys() == LATER.keys()
+    assert np.all(np.abs(moved[:, :-2] - together[:, :1]).max(axis=(0, 2)) > 1e-3)
+    assert np.array_equal(moved[:, -2:], batch(plain))
+
+
+def test_later_effects_at_nought_are_nothing():
+    zero = {"kick": 0.0, "right": 0.0, "left": 0.0, "delay": 0.0, "loss": 0.0, "acceleration": 0.0, "rate": 0.0}
+    effects = [{name: {key: zero.get(key, value) for key, value in law.items()} for name, law in LATE.items()}]
+    still = batch(effects, rngs=[np.random.default_rng(1)])
+    assert np.abs(still - batch([{}])).max() < 1e-14
+
+
+def test_castors_kick_after_a_reversal_alone():
+    """Straight ahead, back at row 15: the heading stays until the robot rolls back, then turns to the kick's side."""
+    straight = ROBOT | {"gain": np.array([[0.4, 0.4], [24.0, -24.0]]), "dead_zone": np.zeros(2)}
+    straight["coupling"] = np.zeros(2)
+    command = np.where(np.arange(ROWS) < 15, 0.8, -0.8)[:, None, None] * np.ones((1, 2))
+    found = simulate(
+        [straight], [{"castor_kick": {"kick": 4.0, "fade": 0.2}}], np.array([PERIOD]), command, START[None], np.zeros(1)
+    )[:, 0]
+    back = int(np.argmax((found[:, :2] - START[:2]) @ [np.cos(0.5), np.sin(0.5)]))
+    assert 15 < back < ROWS - 10
+    assert np.abs(found[: back - 1, 2] - START[2]).max() < 1e-9
+    assert found[-1, 2] < START[2] - 0.05  # to the sign of v
+
+
+def test_bumps_come_at_their_rate_and_jump_as_far():
+    """Within five standard errors: 2000 rows of 0.04 s at 5 a second."""
+    law = {"bumps": {"rate": np.array([5.0]), "along": np.array([0.1]), "heading": np.array([2.0])}}
+    found = bumped(law, np.array([PERIOD]), np.zeros((2000, 1, 2)), [np.random.default_rng(1)])[:, 0] * PERIOD
+    hit = np.any(found != 0.0, axis=1)
+    assert abs(hit.sum() - 400) < 5 * np.sqrt(400 * 0.8)
+    assert found[hit].std(axis=0) == pytest.approx([0.1, 2.0], rel=5 / np.sqrt(2 * 400))
+    assert np.array_equal(bumped(law, np.array([PERIOD]), np.ones((9, 1, 2)), None), np.ones((9, 1, 2)))
 
 
 def test_other_forms_are_other_and_alike():

@@ -28,6 +28,14 @@ OUTSIDE = DELAY | {
 }
 
 
+MANY = DELAY | {"kind": "many", "accepted": [["transport_delay"], ["slope"], ["turn_loss"], ["backlash"]]}
+MIXED = DELAY | {
+    "kind": "mixed",
+    "effects": [*DELAY["effects"], {"name": "tether", "parameters": {}, "sites": ["drive", "contact"]}],
+    "outside": ["tether"],
+}
+
+
 def says(*selected, verdict="effects", alike=None, p=0.9, site="actuation", channel="along"):
     """A diagnosis as `jaxident diagnose` writes it."""
     sets = (
@@ -107,3 +115,35 @@ def test_probabilities():
     both = says("motor_lag") | {"probability": {"gap": 0.9, "unexplained": 0.0, "sets": sets}}
     assert mark(DELAY, both)["top"] == (0.5, False)
     assert mark(DELAY, both)["probability_of_truth"] == pytest.approx(0.4)
+
+
+@pytest.mark.parametrize(
+    ("diagnosis", "named", "extras", "right"),
+    [
+        (says("slope", "backlash", "turn_loss", "transport_delay"), 4, 0, True),
+        (says("slope", "turn_loss", "mass_offset", verdict="partly"), 2, 1, False),
+        (says("motor_lag", "slope", alike={"motor_lag": ["slope", "backlash"]}), 2, 0, False),
+        (says("motor_lag", alike={"motor_lag": ["slope", "backlash"]}), 1, 0, False),
+        (says(verdict="unknown"), 0, 0, False),
+        (None, 0, 0, False),
+    ],
+)
+def test_how_many_are_named(diagnosis, named, extras, right):
+    found = mark(MANY, diagnosis)
+    assert (found["hidden"], found["named"], found["extras"], found["right"]) == (4, named, extras, right)
+
+
+@pytest.mark.parametrize(
+    ("diagnosis", "some", "told", "extras"),
+    [
+        (says("transport_delay", verdict="partly"), True, True, 0),
+        (says("transport_delay"), True, False, 0),
+        (says("slope", verdict="partly"), False, True, 1),
+        (says(verdict="unknown"), False, True, 0),
+    ],
+)
+def test_one_of_the_catalogue_beside_one_outside(diagnosis, some, told, extras):
+    found = mark(MIXED, diagnosis)
+    assert (found["some"], found["unexplained"], found["extras"]) == (some, told, extras)
+    assert found["channel"] is None  # the channel of most excess may be the outside effect's
+    assert mark(MIXED, says("transport_delay", site="drive"))["site"] is True

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from support.withheld_cases import model_of
 from withheld import cases, seal
+from withheld.calibration import calibration_error
 from withheld.diagnose import diagnose
 from withheld.fresh import fresh_runs, local_motion, true_shrink
 from withheld.intervals import bootstrap, wilson
-from withheld.judge import judge
+from withheld.judge import added, judge, shrinkable
 from withheld.misses import misses
-from withheld.score import calibration_error, table
+from withheld.score import table
 
 import jaxident as ji
 
@@ -39,7 +40,7 @@ def marks(kind, count, **more):
     base = {
         "kind": kind, "verdict": "effects", "claimed": True, "unexplained": False, "right": True, "strict": True,
         "some": True, "extra": False, "site": True, "channel": None, "top": (0.8, True), "probability_of_truth": 0.8,
-        "strength": [0.5], "selected": ["slope"],
+        "strength": [0.5], "selected": ["slope"], "hidden": 1, "named": 1, "extras": 0,
     }  # fmt: skip
     return [base | more for _ in range(count)]
 
@@ -56,6 +57,49 @@ def test_table():
     assert rows["shrink achieved over achievable, median"]["value"] == pytest.approx(0.9)
     assert rows["shrink inside its 90 % interval"]["value"] == pytest.approx(0.9)
     assert rows["first hypothesis: probability less share right"]["value"] == pytest.approx(-0.2)
+
+
+def rows_of(given):
+    return {row["row"]: row for row in table(given)}
+
+
+def test_many_count_effects_and_mixed_count_cases():
+    given = marks("many", 3, hidden=4, named=4) + marks("many", 1, hidden=5, named=1, extras=2, unexplained=True)
+    given += marks("mixed", 3, unexplained=True) + marks("mixed", 1, some=False, extras=1)
+    rows = rows_of(given)
+    assert rows["four or five effects: share named"]["value"] == pytest.approx(13 / 17)
+    assert rows["four or five effects: false extras a case"]["value"] == 0.5
+    assert rows["one of the catalogue beside one outside: the first named"]["value"] == 0.75
+    assert rows["one of the catalogue beside one outside: the rest told"]["value"] == 0.75
+    assert rows["in the catalogue: something unexplained told"]["value"] == 0.25  # of the many; mixed has a rest
+
+
+def test_the_worst_tenth_of_the_shrink():
+    given = [mark for k in range(11) for mark in marks("many" if k % 2 else "pair", 1, shrink=np.float64(k / 10))]
+    given += marks("mixed", 1, shrink=np.nan) + marks("mixed", 1, shrink=-50.0)
+    rows = rows_of(given)
+    assert rows["shrink achieved over achievable, worst tenth"]["value"] == pytest.approx(0.1)
+    assert rows["shrink achieved over achievable, median"]["value"] == pytest.approx(0.5)
+    mixed = "one of the catalogue beside one outside: shrink achieved over achievable, median"
+    assert rows[mixed]["value"] == -1.0  # twice as far off, or not finite, is as bad as any
+
+
+def test_chance_alone_leaves_nothing_to_shrink():
+    assert not shrinkable({"effects": [{"name": "outliers"}, {"name": "lost_commands"}]})
+    assert shrinkable({"effects": [{"name": "outliers"}, {"name": "slope"}]})
+
+
+def test_marks_from_other_programs(tmp_path):
+    """Shares and promises of cases that are scored; others are left aside."""
+    shares = {"rows": [{"interval": [0.1, 0.3], "true": 0.2}, {"interval": [0.1, 0.3], "true": 0.4}]}
+    (tmp_path / "shares.json").write_text(json.dumps({"case_1": shares, "case_9": shares}))
+    (tmp_path / "promise.json").write_text(json.dumps({"case_1": {"fresh": 8.0, "promised": 2.0}}))
+    more = added(["case_1", "case_2"], tmp_path / "shares.json", tmp_path / "promise.json")
+    assert more == {"case_1": {"shares": [True, False], "promise": 4.0}, "case_2": {}}
+    rows = rows_of(marks("single", 1, **more["case_1"]) + marks("single", 1))
+    assert rows["true share of an effect inside its 90 % interval"]["value"] == 0.5
+    assert rows["error on fresh runs over that promised: above 3"]["value"] == 1.0
+    assert rows["error on fresh runs over that promised: above 3"]["cases"] == 1
 
 
 def test_a_sealed_answer_opens_with_its_key_only(tmp_path):
