@@ -1,0 +1,70 @@
+"""What changes with session time [s]: the sum of the durations of the runs before, plus the time in this one."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from jaxident.array_types import Array, Wheels
+from jaxident.effects.effect import BOTH, UNIT, Coordinate, EffectRecord, Parameter, Search, Transform, signed
+from jaxident.effects.signals import Load, Zone
+
+
+def gain_drift(m: Wheels, _: Wheels, time: Array, rate: Array) -> Wheels:
+    """(1 + k t) m, not below 0: a battery that empties, a motor that warms up."""
+    left = jnp.maximum(1.0 + rate * time, 0.0)
+    return Wheels(m.right * left, m.left * left)
+
+
+def dead_zone_drift(zone: Zone, time: Array, rate: Array) -> Zone:
+    """D + k t, not below 0: wear, or grease that warms up."""
+    return Zone(*(Wheels(*(jnp.maximum(width + rate * time, 0.0) for width in widths)) for widths in zone))
+
+
+def payload_instant(ratio: Array, instant: Array) -> Array:
+    """When the payload changes, in session time [s]."""
+    return instant
+
+
+def payload_change(changed: Array, ratio: Array, instant: Array) -> Array:
+    """What accelerations are multiplied with: 1 / ratio once the payload has changed, 1 before."""
+    return jnp.where(changed, 1.0 / ratio, 1.0)
+
+
+def payload_lightness(time: Array, step: Array, loss: Array, instant: Array) -> Array:
+    """`payload_change` over a substep about a session time, smooth in the instant: what accelerations keep."""
+    return 1.0 - loss * jax.nn.sigmoid((time - instant) / step)
+
+
+def _record(stage, name, words, equation, parameters, act, source, **more) -> EffectRecord:
+    return EffectRecord(name, "time", stage, words, equation, parameters, BOTH, source, act, **more)
+
+
+RECORDS = (
+    _record(
+        "motor", "gain_drift", "the drive grows weaker or stronger with time, as when a battery runs down",
+        "m -> (1 + k t) m, t the session time", (Parameter("rate", "1/s", 0.0, (-0.03, 0.03), -0.02),), gain_drift,
+        "discharge of batteries; Plett 2015, Battery Management Systems, ch. 2", varies=True,
+        confused_with=("dead_zone_drift",), search=Search((signed("rate", 0.05),)),
+    ),
+    _record(
+        "zone", "dead_zone_drift", "the dead zones change with time, as by wear",
+        "D -> D + k t, t the session time", (Parameter("rate", f"{UNIT}/s", 0.0, (-0.02, 0.02), 0.01),),
+        dead_zone_drift, "run-in and wear of gears; Olsson et al. 1998, Eur. J. Control 4", rank=-1, varies=True,
+        confused_with=("gain_drift",), search=Search((signed("rate", 0.05),)),
+    ),
+    _record(
+        "load", "payload_change", "the load changed at some instant",
+        "[v, w]' -> [v, w]' / r from the session time t_c on",
+        (Parameter("ratio", "", 1.0, (0.5, 3.0), 1.5, least=0.0, above=True),
+         Parameter("instant", "s", 0.0, (0.0, 1000.0), 1.0, shape=True, instant=True)),
+        Load(payload_instant, payload_change),
+        "Newton's second law; Basseville, Nikiforov 1993, Detection of Abrupt Changes", fast=payload_lightness,
+        search=Search((signed("loss", 0.8, below=1.0),
+                       Coordinate("instant", 0.0, 0.0, 1e4, 10.0, shape=True, reach=(10.0, 1.2, 0.15))),
+                      Transform(lambda c: {"ratio": 1.0 / (1.0 - c["loss"]), "instant": float(c["instant"])},
+                                lambda p: {"loss": 1.0 - 1.0 / p["ratio"], "instant": p["instant"]}),
+                      lambda duration: [{"loss": 0.1, "instant": duration * part}
+                                        for part in np.linspace(0.06, 0.94, 12)]),
+    ),
+)  # fmt: skip
+"""The effects of this site."""
