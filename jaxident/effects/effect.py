@@ -182,7 +182,8 @@ class EffectRecord(NamedTuple):
 
     smooth: whether the simulation has a derivative by the parameters at neutral; where not, `grid` holds values of the
     first parameter to try instead. sharp: it has corners within a sample. varies: it changes while the command is held.
-    extension: beyond the catalogue that this program was asked for. Every record has `search` or `chance`.
+    timed: it goes by session time. extension: beyond the catalogue that this program was asked for.
+    Every record has `search` or `chance`.
     """
 
     name: str
@@ -203,6 +204,7 @@ class EffectRecord(NamedTuple):
     grid: tuple[float, ...] | None = None
     sharp: bool = False
     varies: bool = False
+    timed: bool = False
     extension: bool = False
 
     @property
@@ -218,6 +220,10 @@ class EffectRecord(NamedTuple):
     def law(self) -> Any:
         """Its law in the coordinates of the search."""
         return self.act if self.fast is None else self.fast
+
+    def neutral(self) -> dict[str, float]:
+        """Parameters at which it does nothing, by name."""
+        return {parameter.name: parameter.neutral for parameter in self.parameters}
 
     def typical(self, duration: float | None = None) -> dict[str, Any]:
         """Parameters of a clear but not extreme case, by name, for a session of some duration [s]."""

@@ -43,14 +43,14 @@ RECORDS = (
     _record(
         "motor", "gain_drift", "the drive grows weaker or stronger with time, as when a battery runs down",
         "m -> (1 + k t) m, t the session time", (Parameter("rate", "1/s", 0.0, (-0.03, 0.03), -0.02),), gain_drift,
-        "discharge of batteries; Plett 2015, Battery Management Systems, ch. 2", varies=True,
+        "discharge of batteries; Plett 2015, Battery Management Systems, ch. 2", varies=True, timed=True,
         confused_with=("dead_zone_drift",), search=Search((signed("rate", 0.05),)),
     ),
     _record(
         "zone", "dead_zone_drift", "the dead zones change with time, as by wear",
         "D -> D + k t, t the session time", (Parameter("rate", f"{UNIT}/s", 0.0, (-0.02, 0.02), 0.01),),
         dead_zone_drift, "run-in and wear of gears; Olsson et al. 1998, Eur. J. Control 4", rank=-1, varies=True,
-        confused_with=("gain_drift",), search=Search((signed("rate", 0.05),)),
+        timed=True, confused_with=("gain_drift",), search=Search((signed("rate", 0.05),)),
     ),
     _record(
         "load", "payload_change", "the load changed at some instant",
@@ -59,6 +59,7 @@ RECORDS = (
          Parameter("instant", "s", 0.0, (0.0, 1000.0), 1.0, shape=True, instant=True)),
         Load(payload_instant, payload_change),
         "Newton's second law; Basseville, Nikiforov 1993, Detection of Abrupt Changes", fast=payload_lightness,
+        timed=True,
         search=Search((signed("loss", 0.8, below=1.0),
                        Coordinate("instant", 0.0, 0.0, 1e4, 10.0, shape=True, reach=(10.0, 1.2, 0.15))),
                       Transform(lambda c: {"ratio": 1.0 / (1.0 - c["loss"]), "instant": float(c["instant"])},
