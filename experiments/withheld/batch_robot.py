@@ -9,7 +9,7 @@ not be quadratic. `OUTSIDE` are effects that no catalogue lists.
 import numpy as np
 
 from .batch_camera import report
-from .batch_input import arriving, delays, pair, pushed, sent_commands
+from .batch_input import arriving, delays, pair, polled, pushed, sent_commands
 
 SUBSTEPS, RUBBING, SWEEPS = 16, 64, 8
 """Substeps per row, those of runs with dry friction, and sweeps over the two wheels' frictions."""
@@ -25,6 +25,8 @@ NEUTRAL: dict[str, dict[str, float]] = {
     "backlash": {"right": 0.0, "left": 0.0},
     "supply_sag": {"resistance": 0.0},
     "lost_commands": {"probability": 0.0},
+    "command_polling": {"period": 0.0, "phase": 0.0},
+    "twist_quantisation": {"mean": 0.0, "difference": 0.0},
     "coulomb_friction": {"right": 0.0, "left": 0.0},
     "stiction": {"right": 0.0, "left": 0.0, "fade": 0.05},
     "quadratic_drag": {"along": 0.0, "heading": 0.0},
@@ -84,6 +86,7 @@ def simulate(robots, effects, period, u, start, session_time, slip=None, rngs=No
     for row in range(rows - 1):
         shove = np.zeros((runs, 2)) if slip is None else slip[row]
         targets = arriving(sent, row, delay[row], substeps)
+        targets = polled(p, sent, row, delay[row], targets, period, session_time)
         for j in range(substeps):
             time = session_time + row * period + (j + 0.5) * h
             drive = pushed(p, robot, memory, targets[j], time, h)
