@@ -72,11 +72,11 @@ def _steps(_: float) -> list[dict[str, float]]:
 
 
 def _polls(_: float) -> list[dict[str, float]]:
-    return [{"period": period, "phase": phase} for period in (0.02, 0.05, 0.1, 0.2) for phase in (0.0, 0.33, 0.67)]
+    return [{"period": period, "phase": phase} for period in (0.03, 0.1) for phase in (0.0, 0.33, 0.67)]
 
 
 def _twists(_: float) -> list[dict[str, float]]:
-    sizes = (0.03, 0.1, 0.3)
+    sizes = (0.05, 0.2)
     return [{"mean": mean, "difference": difference} for mean in sizes for difference in sizes]
 
 
