@@ -130,37 +130,42 @@ def _from_slope(parameters) -> dict[str, float]:
     return {"x": g * np.cos(angle), "y": g * np.sin(angle)}
 
 
-def _record(stage, name, words, equation, parameters, channels, act, source, **more) -> EffectRecord:
-    return EffectRecord(name, "contact", stage, words, equation, parameters, channels, source, act, **more)
-
-
 RECORDS = (
-    _record(
-        "grip", "traction_limit",
-        "the wheels push no harder than their grip on the floor, or the motors' current, allows",
-        "per wheel c = m - n -> L tanh(c / L); dry: c, beyond +-L +-L until e = 0, tau e' = c -+ L - e",
-        (Parameter("limit", UNIT, float("inf"), (0.2, 2.0), 0.5, least=0.0, above=True),
-         Parameter("dry", "", 0.0, (0.0, 1.0), 0.0, least=0.0, most=1.0, shape=True),
-         Parameter("spin", "s", 0.0, (0.0, 0.1), 0.0, least=0.0, shape=True)), BOTH, Grip(_slide, _lost),
-        "Pacejka 2012, Tire and Vehicle Dynamics, ch. 4 (smooth saturation of the tyre force); dry: Coulomb friction "
-        "under a wheel with inertia", fast=Grip(_slide_fast, _lost_fast), confused_with=("motor_lag",), smooth=False,
+    EffectRecord(
+        name="traction_limit", site="contact", stage="grip",
+        words="the wheels push no harder than their grip on the floor, or the motors' current, allows",
+        equation="per wheel c = m - n -> L tanh(c / L); dry: c, beyond +-L +-L until e = 0, tau e' = c -+ L - e",
+        source="Pacejka 2012, Tire and Vehicle Dynamics, ch. 4 (smooth saturation of the tyre force); dry: Coulomb "
+               "friction under a wheel with inertia",
+        parameters=(Parameter("limit", UNIT, float("inf"), (0.2, 2.0), 0.5, least=0.0, above=True),
+                    Parameter("dry", "", 0.0, (0.0, 1.0), 0.0, least=0.0, most=1.0, shape=True),
+                    Parameter("spin", "s", 0.0, (0.0, 0.1), 0.0, least=0.0, shape=True)),
+        channels=BOTH,
+        act=Grip(_slide, _lost), fast=Grip(_slide_fast, _lost_fast), confused_with=("motor_lag",), smooth=False,
         grid=(2.0, 1.0, 0.7, 0.5, 0.3, 0.2), sharp=True,
         search=Search((positive("inverse_square", 100.0),
                        Coordinate("dry", 0.0, 0.0, 1.0, 1.0, shape=True, stepped=True),
                        Coordinate("spin", 0.0, 0.0, 0.3, 0.02, shape=True)), Transform(_to_limit, _from_limit),
                       lambda _: [{}, {"inverse_square": 2.0, "dry": 1.0, "spin": 0.02}]),
     ),
-    _record(
-        "side", "lateral_slip", "the robot drifts outwards in curves", "sideways speed -c v w",
-        (Parameter("slip", "s", 0.0, (0.0, 0.1), 0.03),), (LATERAL,), lateral_slip,
-        "Wong 2008, Theory of Ground Vehicles, ch. 5 (cornering stiffness)", confused_with=("marker_offset",),
+    EffectRecord(
+        name="lateral_slip", site="contact", stage="side",
+        words="the robot drifts outwards in curves",
+        equation="sideways speed -c v w",
+        source="Wong 2008, Theory of Ground Vehicles, ch. 5 (cornering stiffness)",
+        parameters=(Parameter("slip", "s", 0.0, (0.0, 0.1), 0.03),), channels=(LATERAL,),
+        act=lateral_slip, confused_with=("marker_offset",),
         search=Search((signed("slip", 0.5),), on_speeds=True),
     ),
-    _record(
-        "body", "slope", "the floor is not level", "v' += g cos(theta - theta_0)",
-        (Parameter("acceleration", "m/s^2", 0.0, (0.0, 0.5), 0.05),
-         Parameter("direction", "rad", 0.0, (-3.15, 3.15), 0.7, shape=True)), (ALONG,), slope,
-        "gravity on a tilted floor: 0.1 m/s^2 is 0.6 degrees", fast=slope_by_components,
+    EffectRecord(
+        name="slope", site="contact", stage="body",
+        words="the floor is not level",
+        equation="v' += g cos(theta - theta_0)",
+        source="gravity on a tilted floor: 0.1 m/s^2 is 0.6 degrees",
+        parameters=(Parameter("acceleration", "m/s^2", 0.0, (0.0, 0.5), 0.05),
+                    Parameter("direction", "rad", 0.0, (-3.15, 3.15), 0.7, shape=True)),
+        channels=(ALONG,),
+        act=slope, fast=slope_by_components,
         search=Search((signed("x", 3.0), signed("y", 3.0)), Transform(_to_slope, _from_slope)),
     ),
 )  # fmt: skip

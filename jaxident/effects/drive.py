@@ -46,48 +46,60 @@ def _levels(typical: float) -> tuple[Parameter, Parameter]:
     )
 
 
-def _record(stage, name, words, equation, parameters, channels, act, source, **more) -> EffectRecord:
-    return EffectRecord(name, "drive", stage, words, equation, parameters, channels, source, act, **more)
-
-
 RECORDS = (
-    _record(
-        "friction", "coulomb_friction", "dry friction, the same at any speed",
-        "m -> m - F sign n, n the wheel's speed; at rest |F| up to its level", _levels(0.08), BOTH, coulomb_friction,
-        "Olsson et al. 1998, Friction models and friction compensation, Eur. J. Control 4",
-        confused_with=("asymmetric_dead_zone", "quadratic_drag"), sharp=True,
+    EffectRecord(
+        name="coulomb_friction", site="drive", stage="friction",
+        words="dry friction, the same at any speed",
+        equation="m -> m - F sign n, n the wheel's speed; at rest |F| up to its level",
+        source="Olsson et al. 1998, Friction models and friction compensation, Eur. J. Control 4",
+        parameters=_levels(0.08), channels=BOTH,
+        act=coulomb_friction, confused_with=("asymmetric_dead_zone", "quadratic_drag"), sharp=True,
         search=Search((positive("right", 0.5), positive("left", 0.5)), on_speeds=True),
     ),
-    _record(
-        "friction", "stiction", "it takes more to leave rest than to keep moving",
-        "m -> m - F exp(-(n / n_s)^2) sign n; at rest |F| up to its level",
-        (*_levels(0.1), Parameter("fade", UNIT, 0.05, (0.01, 0.2), 0.05, least=0.0, above=True, shape=True)), BOTH,
-        stiction, "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30 (Stribeck's curve)",
-        confused_with=("coulomb_friction",), smooth=False, grid=(0.01, 0.02, 0.05, 0.1, 0.15, 0.2), sharp=True,
+    EffectRecord(
+        name="stiction", site="drive", stage="friction",
+        words="it takes more to leave rest than to keep moving",
+        equation="m -> m - F exp(-(n / n_s)^2) sign n; at rest |F| up to its level",
+        source="Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30 (Stribeck's curve)",
+        parameters=(*_levels(0.1), Parameter("fade", UNIT, 0.05, (0.01, 0.2), 0.05, least=0.0, above=True, shape=True)),
+        channels=BOTH,
+        act=stiction, confused_with=("coulomb_friction",), smooth=False, grid=(0.01, 0.02, 0.05, 0.1, 0.15, 0.2),
+        sharp=True,
         search=Search((positive("right", 0.6), positive("left", 0.6),
                        Coordinate("fade", 0.05, 0.005, 0.4, 0.05, shape=True)), on_speeds=True,
                       seeds=lambda _: [{"right": s, "left": s, "fade": fade}
                                        for s, fade in ((0.05, 0.05), (0.15, 0.05), (0.1, 0.15))]),
     ),
-    _record(
-        "body", "quadratic_drag", "drag that grows with the square of the speed", "v' -= c v |v|, w' -= d w |w|",
-        (Parameter("along", "1/m", 0.0, (0.0, 2.0), 0.5, least=0.0),
-         Parameter("heading", "1/rad", 0.0, (0.0, 2.0), 0.3, least=0.0)), BOTH, quadratic_drag,
-        "Fossen 2011, Handbook of Marine Craft, ch. 6; fans and brushes on land",
-        confused_with=("coulomb_friction", "turn_loss"),
+    EffectRecord(
+        name="quadratic_drag", site="drive", stage="body",
+        words="drag that grows with the square of the speed",
+        equation="v' -= c v |v|, w' -= d w |w|",
+        source="Fossen 2011, Handbook of Marine Craft, ch. 6; fans and brushes on land",
+        parameters=(Parameter("along", "1/m", 0.0, (0.0, 2.0), 0.5, least=0.0),
+                    Parameter("heading", "1/rad", 0.0, (0.0, 2.0), 0.3, least=0.0)),
+        channels=BOTH,
+        act=quadratic_drag, confused_with=("coulomb_friction", "turn_loss"),
         search=Search((Coordinate("along", 0.0, 0.0, 100.0, 3.0), positive("heading", 5.0)), on_speeds=True),
     ),
-    _record(
-        "body", "mass_offset", "the centre of mass lies off the axle", "v' += c w^2, w' -= d v w",
-        (Parameter("along", "m", 0.0, (-0.1, 0.1), 0.01), Parameter("heading", "1/m", 0.0, (-20.0, 20.0), 3.0)), BOTH,
-        mass_offset, "Fierro, Lewis 1998, Control of a nonholonomic mobile robot, IEEE TNN 9",
-        confused_with=("turn_loss",), search=Search((signed("along", 0.4), signed("heading", 40.0)), on_speeds=True),
+    EffectRecord(
+        name="mass_offset", site="drive", stage="body",
+        words="the centre of mass lies off the axle",
+        equation="v' += c w^2, w' -= d v w",
+        source="Fierro, Lewis 1998, Control of a nonholonomic mobile robot, IEEE TNN 9",
+        parameters=(Parameter("along", "m", 0.0, (-0.1, 0.1), 0.01),
+                    Parameter("heading", "1/m", 0.0, (-20.0, 20.0), 3.0)),
+        channels=BOTH,
+        act=mass_offset, confused_with=("turn_loss",),
+        search=Search((signed("along", 0.4), signed("heading", 40.0)), on_speeds=True),
     ),
-    _record(
-        "body", "turn_loss", "speed is lost while turning", "v' -= c |w| v",
-        (Parameter("loss", "1/rad", 0.0, (0.0, 20.0), 0.1, least=0.0),), (ALONG,), turn_loss,
-        "castor scrub; Wong 2008, Theory of Ground Vehicles, ch. 6", confused_with=("quadratic_drag", "mass_offset"),
-        sharp=True, search=Search((Coordinate("loss", 0.0, 0.0, 50.0, 0.6),), on_speeds=True),
+    EffectRecord(
+        name="turn_loss", site="drive", stage="body",
+        words="speed is lost while turning",
+        equation="v' -= c |w| v",
+        source="castor scrub; Wong 2008, Theory of Ground Vehicles, ch. 6",
+        parameters=(Parameter("loss", "1/rad", 0.0, (0.0, 20.0), 0.1, least=0.0),), channels=(ALONG,),
+        act=turn_loss, confused_with=("quadratic_drag", "mass_offset"), sharp=True,
+        search=Search((Coordinate("loss", 0.0, 0.0, 50.0, 0.6),), on_speeds=True),
     ),
 )  # fmt: skip
 """The effects of this site."""

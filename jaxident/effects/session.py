@@ -35,31 +35,36 @@ def payload_lightness(time: Array, step: Array, loss: Array, instant: Array) -> 
     return 1.0 - loss * jax.nn.sigmoid((time - instant) / step)
 
 
-def _record(stage, name, words, equation, parameters, act, source, **more) -> EffectRecord:
-    return EffectRecord(name, "time", stage, words, equation, parameters, BOTH, source, act, **more)
-
-
 RECORDS = (
-    _record(
-        "motor", "gain_drift", "the drive grows weaker or stronger with time, as when a battery runs down",
-        "m -> (1 + k t) m, t the session time", (Parameter("rate", "1/s", 0.0, (-0.03, 0.03), -0.02),), gain_drift,
-        "discharge of batteries; Plett 2015, Battery Management Systems, ch. 2", varies=True, timed=True,
-        confused_with=("dead_zone_drift",), search=Search((signed("rate", 0.05),)),
+    EffectRecord(
+        name="gain_drift", site="time", stage="motor",
+        words="the drive grows weaker or stronger with time, as when a battery runs down",
+        equation="m -> (1 + k t) m, t the session time",
+        source="discharge of batteries; Plett 2015, Battery Management Systems, ch. 2",
+        parameters=(Parameter("rate", "1/s", 0.0, (-0.03, 0.03), -0.02),),
+        channels=BOTH,
+        act=gain_drift, confused_with=("dead_zone_drift",), varies=True, timed=True,
+        search=Search((signed("rate", 0.05),)),
     ),
-    _record(
-        "zone", "dead_zone_drift", "the dead zones change with time, as by wear",
-        "D -> D + k t, t the session time", (Parameter("rate", f"{UNIT}/s", 0.0, (-0.02, 0.02), 0.01),),
-        dead_zone_drift, "run-in and wear of gears; Olsson et al. 1998, Eur. J. Control 4", rank=-1, varies=True,
-        timed=True, confused_with=("gain_drift",), search=Search((signed("rate", 0.05),)),
+    EffectRecord(
+        name="dead_zone_drift", site="time", stage="zone",
+        words="the dead zones change with time, as by wear",
+        equation="D -> D + k t, t the session time",
+        source="run-in and wear of gears; Olsson et al. 1998, Eur. J. Control 4",
+        parameters=(Parameter("rate", f"{UNIT}/s", 0.0, (-0.02, 0.02), 0.01),),
+        channels=BOTH,
+        act=dead_zone_drift, rank=-1, confused_with=("gain_drift",), varies=True, timed=True,
+        search=Search((signed("rate", 0.05),)),
     ),
-    _record(
-        "load", "payload_change", "the load changed at some instant",
-        "[v, w]' -> [v, w]' / r from the session time t_c on",
-        (Parameter("ratio", "", 1.0, (0.5, 3.0), 1.5, least=0.0, above=True),
-         Parameter("instant", "s", 0.0, (0.0, 1000.0), 1.0, shape=True, instant=True)),
-        Load(payload_instant, payload_change),
-        "Newton's second law; Basseville, Nikiforov 1993, Detection of Abrupt Changes", fast=payload_lightness,
-        timed=True,
+    EffectRecord(
+        name="payload_change", site="time", stage="load",
+        words="the load changed at some instant",
+        equation="[v, w]' -> [v, w]' / r from the session time t_c on",
+        source="Newton's second law; Basseville, Nikiforov 1993, Detection of Abrupt Changes",
+        parameters=(Parameter("ratio", "", 1.0, (0.5, 3.0), 1.5, least=0.0, above=True),
+                    Parameter("instant", "s", 0.0, (0.0, 1000.0), 1.0, shape=True, instant=True)),
+        channels=BOTH,
+        act=Load(payload_instant, payload_change), fast=payload_lightness, timed=True,
         search=Search((signed("loss", 0.8, below=1.0),
                        Coordinate("instant", 0.0, 0.0, 1e4, 10.0, shape=True, reach=(10.0, 1.2, 0.15))),
                       Transform(lambda c: {"ratio": 1.0 / (1.0 - c["loss"]), "instant": float(c["instant"])},
