@@ -28,12 +28,14 @@ How to add an effect
 2. Write the function in the file of its site, and below it one `EffectRecord` in `RECORDS`. That is all: the catalogue,
    both integrators, the command line, model files, reports and the search read the record. No other line of the
    package names an effect.
-3. Give it a twin in `tests/support/reference_effects.py`, written from the equation and not from the code. The tests
-   that run over the whole catalogue then compare both integrators with it.
+3. Give it twins, written from the equation and not from the code: in `tests/support/reference_effects.py`, and in the
+   robots with hidden effects (`experiments/withheld`: `batch_robot.NEUTRAL`, `robots.LAWS`). The tests that run over
+   the whole catalogue then compare both integrators with them.
 
-Where the search has other coordinates than the catalogue has parameters (a limit's inverse, say), `search.transform`
-leads to and fro, and `fast` is the law in these coordinates. A law of stage `gear` may have a `fast` form for whole
-runs, `(push, drive, step, **values) -> Push`; without one its `act` is scanned.
+An effect that draws has `chance` in place of `search`, and takes `keys` before its values. Where the search has other
+coordinates than the catalogue has parameters (a limit's inverse, say), `search.transform` leads to and fro, and `fast`
+is the law in these coordinates. A law of stage `load` needs a `fast` form (see `signals.Load`). A law of stage `gear`
+may have one for whole runs, `(push, drive, step, **values) -> Push`; without it `act` is scanned.
 """
 
 import math
