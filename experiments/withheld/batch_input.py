@@ -17,6 +17,7 @@ def sent_commands(p, u, rngs):
     level, smooth = (p["input_saturation"][key][:, None] for key in ("level", "form"))
     bound = np.where(np.isfinite(level), level, 1.0)
     u = np.where(smooth > 0, bound * np.tanh(u / bound), np.clip(u, -level, level))
+    u = twisted(u, *(p["twist_quantisation"][key][:, None] for key in ("mean", "difference")))
     step, toward_zero = (p["input_quantisation"][key][:, None] for key in ("step", "form"))
     count = u / np.where(step > 0, step, 1.0)
     u = np.where(step > 0, np.where(toward_zero > 0, np.trunc(count), np.round(count)) * step, u)
@@ -25,6 +26,15 @@ def sent_commands(p, u, rngs):
         lost = happens(rngs[run], len(u), chance, bursts)
         u[:, run] = u[np.maximum.accumulate(np.where(lost, 0, np.arange(len(u)))), run]
     return u
+
+
+def twisted(u, mean, difference):
+    """Commands (rows, runs, 2) whose mean and difference come in whole steps (runs, 1), 0 for none."""
+    parts = np.stack([u.mean(axis=2), u[..., 0] - u[..., 1]], axis=-1)
+    steps = np.concatenate([mean, difference], axis=1)
+    parts = np.where(steps > 0, np.round(parts / np.where(steps > 0, steps, 1.0)) * steps, parts)
+    told = np.stack([parts[..., 0] + 0.5 * parts[..., 1], parts[..., 0] - 0.5 * parts[..., 1]], axis=-1)
+    return np.where(np.any(steps > 0, axis=1)[:, None], told, u)
 
 
 def happens(rng, rows, chance, bursts):
@@ -56,6 +66,20 @@ def arriving(sent, row, delay, substeps):
         return np.where((index >= 0)[..., None], sent[np.maximum(index, 0), runs], 0.0)
 
     return early * at(first) + (1.0 - early) * at(last)
+
+
+def polled(p, sent, row, delay, targets, period, session_time):
+    """The means `targets` over the substeps of a row, but of what the base read last where it reads now and then. No
+    substep holds more than one reading."""
+    reads, phase = p["command_polling"]["period"], p["command_polling"]["phase"]
+    every = np.where(reads > 0, reads, 1.0)
+    edges = session_time + period * (row + np.arange(len(targets) + 1)[:, None] / len(targets))
+    number = np.floor(edges / every - phase + 1e-9)
+    last = (number + phase) * every
+    index = np.floor((last - session_time) / period - delay + 1e-6).astype(int)
+    u = np.where((index >= 0)[..., None], sent[np.maximum(index, 0), np.arange(sent.shape[1])], 0.0)
+    early = np.where(number[1:] > number[:-1], (last[1:] - edges[:-1]) / np.diff(edges, axis=0), 1.0)[..., None]
+    return np.where((reads > 0)[:, None], early * u[:-1] + (1.0 - early) * u[1:], targets)
 
 
 def pair(parameters):

@@ -10,7 +10,7 @@ import numpy as np
 
 from . import batch_outside as outside
 from .batch_camera import report
-from .batch_input import arriving, delays, pair, pushed, sent_commands
+from .batch_input import arriving, delays, pair, polled, pushed, sent_commands
 
 SUBSTEPS, RUBBING, SWEEPS = 16, 64, 8
 """Substeps per row, those of runs with dry friction, and sweeps over the two wheels' frictions."""
@@ -26,6 +26,8 @@ NEUTRAL: dict[str, dict[str, float]] = {
     "backlash": {"right": 0.0, "left": 0.0},
     "supply_sag": {"resistance": 0.0},
     "lost_commands": {"probability": 0.0},
+    "command_polling": {"period": 0.0, "phase": 0.0},
+    "twist_quantisation": {"mean": 0.0, "difference": 0.0},
     "coulomb_friction": {"right": 0.0, "left": 0.0},
     "stiction": {"right": 0.0, "left": 0.0, "fade": 0.05},
     "quadratic_drag": {"along": 0.0, "heading": 0.0},
@@ -88,7 +90,9 @@ def simulate(robots, effects, period, u, start, session_time, slip=None, rngs=No
     shoves = outside.bumped(p, period, np.zeros((rows, runs, 2)) if slip is None else slip, rngs)
     for row in range(rows - 1):
         shove = shoves[row]
-        targets = arriving(sent, row, delay[row] + outside.later(p, robot, state, period), substeps)
+        late = delay[row] + outside.later(p, robot, state, period)
+        targets = arriving(sent, row, late, substeps)
+        targets = polled(p, sent, row, late, targets, period, session_time)
         for j in range(substeps):
             time = session_time + row * period + (j + 0.5) * h
             drive = outside.braked(p, robot, state, pushed(p, robot, memory, targets[j], time, h))

@@ -167,6 +167,8 @@ LAWS = {
     "backlash": _wheels(0.15),
     "supply_sag": _one("resistance", 0.35),
     "lost_commands": _one("probability", 0.5),
+    "command_polling": lambda rng, f, *_: {"period": 0.3 * f, "phase": rng.uniform()},
+    "twist_quantisation": lambda rng, f, *_: {"mean": 0.4 * f, "difference": 0.4 * f * rng.uniform(0.5, 2.0)},
     "coulomb_friction": _wheels(0.15),
     "stiction": lambda rng, f, *_: _wheels(0.25)(rng, f) | {"fade": rng.uniform(0.02, 0.1)},
     "quadratic_drag": _drag,

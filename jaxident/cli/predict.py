@@ -64,7 +64,7 @@ def _told(summary, robot, given: bool, known: bool) -> list[str]:
         lines.append(f"{summary['run_up']} starts from a run-up of earlier commands: the filter did not converge there")
     if summary["failed"]:
         lines.append(f"{summary['failed']} predictions are not finite and count in no error")
-    if any(CATALOGUE[effect.name].site == "time" for effect in robot.effects):
+    if any(CATALOGUE[effect.name].timed for effect in robot.effects):
         where = (
             "as told" if given else "where the model's own logs have it" if known else "right after the model's logs"
         )

@@ -96,10 +96,7 @@ def _evidence(found: Answers, name: str, cross: Array) -> np.ndarray:
 
 def _typical(name: str, largest: float, duration: float) -> dict[str, float]:
     """The coordinates of an effect at its typical size."""
-    typical = CATALOGUE[name].typical()
-    if name == "payload_change":
-        typical["instant"] = 0.5 * duration
-    factors = unit_factors(name, largest)
+    typical, factors = CATALOGUE[name].typical(duration), unit_factors(name, largest)
     return from_catalogue(name, {key: value / factors[key] for key, value in typical.items()})
 
 

@@ -15,13 +15,14 @@ from jaxident.diagnosis.common import MOSTLY, Values, explain_together
 from jaxident.diagnosis.noise.law import Law, deviations, first_law
 from jaxident.diagnosis.prepare import Prepared, prepare
 from jaxident.diagnosis.repair import search
+from jaxident.effects.catalogue import BY_CHANCE
 from jaxident.effects.checks import check_effects
 from jaxident.effects.coordinates import vector_of
 from jaxident.errors import InputError
 from jaxident.log import Log, join
 from jaxident.robot.model import Model
 
-MEMORY = "coloured_noise"
+LOST, MEMORY = BY_CHANCE["lost"], BY_CHANCE["memory"]
 STRIDE = 10
 """Rows over which speeds are taken: camera noise hardly counts."""
 NOISY = 0.5
@@ -96,8 +97,8 @@ def _direct(sim: tuple[Prepared, Finding], robot: tuple[Prepared, Finding], pric
     theirs, own = (direct_effects(*side, tuple(worth)) for side in (sim, robot))
     scale = len(robot[0].log.t) / max(len(sim[0].log.t), 1)
     beyond = {name: value - scale * worth.get(name, 0.0) for name, value in direct_evidence(*robot).items()}
-    if "lost_commands" in worth and robot[0].lost[0] > 0.0:
-        beyond["lost_commands"] = _lost_beyond(*robot, sim[0].lost[0])
+    if LOST in worth and robot[0].lost[0] > 0.0:
+        beyond[LOST] = _lost_beyond(*robot, sim[0].lost[0])
     return [name for name in worth if name not in rarer(theirs, own, beyond, price)]
 
 

@@ -6,6 +6,7 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.causes.search import Solution
 from jaxident.diagnosis.noise.law import Law, deviations
 from jaxident.diagnosis.prepare import Prepared
+from jaxident.effects.catalogue import BY_CHANCE
 from jaxident.effects.coordinates import (
     ASIDE,
     COMMAND_POWERS,
@@ -100,7 +101,7 @@ def to_model(
         float(np.median(steps)),
         Physical(np.array(values[:2]), np.array(values[2:6]).reshape(2, 2), np.array(values[8:10])),
         np.array(values[6:8]),
-        noise=noise_of(law, "coloured_noise" in (direct or {})),
+        noise=noise_of(law, BY_CHANCE["memory"] in (direct or {})),
         effects=tuple(found),
         covariance=covariance,
         parameter_order=order,

@@ -6,9 +6,9 @@ import numpy as np
 
 from jaxident.diagnosis.causes.candidates import ENOUGH
 from jaxident.effects.catalogue import CATALOGUE
-from jaxident.effects.coordinates import COORDINATES, SHAPES, from_catalogue, to_catalogue
+from jaxident.effects.coordinates import COORDINATES, SEARCHED, SHAPES, from_catalogue, to_catalogue
 
-ALL_OR_NOTHING = ("input_saturation",)
+ALL_OR_NOTHING = {name for name, search in SEARCHED.items() if search.all_or_nothing}
 """Effects whose gain does not grow with their size: a level above every command does nothing at all."""
 
 
@@ -30,7 +30,7 @@ def _smallest(name: str, gain: float) -> dict[str, float] | None:
         c.name: typical[c.name] if (name, c.name) in SHAPES else c.neutral + ratio * (typical[c.name] - c.neutral)
         for c in COORDINATES[name]
     }
-    if name == "payload_change" and not scaled["loss"] < 1.0:
+    if any(not scaled[c.name] < c.below for c in COORDINATES[name]):
         return None  # no payload takes away more than all
     shapes = [parameter.name for parameter in CATALOGUE[name].parameters if parameter.shape]
     return {key: value for key, value in to_catalogue(name, scaled).items() if key not in shapes}

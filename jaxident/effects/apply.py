@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from jaxident.effects.checks import check_effects
-from jaxident.effects.entry import Entry
+from jaxident.effects.effect import EffectRecord
 from jaxident.robot.model import Effect, Model
 
 
@@ -22,11 +22,11 @@ def with_effects(model: Model, effects: Iterable[tuple[str, dict[str, Any]]]) ->
     return dataclasses.replace(model, effects=(*kept, *new))
 
 
-def sized(entry: Entry, strength: float) -> dict[str, float]:
+def sized(effect: EffectRecord, strength: float) -> dict[str, float]:
     """An effect's parameters at `strength` times its typical distance from neutral; where neutral is infinite, typical
     over strength. Parameters that only shape it stay typical."""
     values = {}
-    for parameter in entry.parameters:
+    for parameter in effect.parameters:
         distance = parameter.typical - parameter.neutral
         size = parameter.typical / strength if math.isinf(distance) else parameter.neutral + strength * distance
         values[parameter.name] = parameter.typical if parameter.shape else size

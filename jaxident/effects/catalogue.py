@@ -7,22 +7,27 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.effects import actuation, camera, contact, drive, time
-from jaxident.effects.entry import Entry
+from jaxident.effects import actuation, camera, contact, drive, session
+from jaxident.effects.effect import EffectRecord
 from jaxident.robot.model import Effect
 
 SITES = ("actuation", "drive", "contact", "time", "camera")
-"""Where an effect acts, from the command to the reported pose."""
+"""What an effect is a property of, from the command to the reported pose; `time` for what changes in a session."""
 
-CATALOGUE: dict[str, Entry] = {
-    entry.name: entry for site in (actuation, drive, contact, time, camera) for entry in site.ENTRIES
+CATALOGUE: dict[str, EffectRecord] = {
+    record.name: record for site in (actuation, drive, contact, session, camera) for record in site.RECORDS
 }
 """Every effect by its name, site by site."""
 
-ORDER = tuple((entry.name, parameter.name) for entry in CATALOGUE.values() for parameter in entry.parameters)
+BY_CHANCE: dict[str, str] = {
+    record.chance.kind: record.name for record in CATALOGUE.values() if record.chance is not None
+}
+"""The name of the effect that each kind of chance has (`effect.Chance`)."""
+
+ORDER = tuple((record.name, parameter.name) for record in CATALOGUE.values() for parameter in record.parameters)
 """Effect and parameter of each entry of the vector that the full simulator takes."""
 
-NEUTRAL = np.array([parameter.neutral for entry in CATALOGUE.values() for parameter in entry.parameters])
+NEUTRAL = np.array([parameter.neutral for record in CATALOGUE.values() for parameter in record.parameters])
 """The vector (parameters,) at which no effect does anything."""
 
 _PLACE = {names: place for place, names in enumerate(ORDER)}

@@ -8,7 +8,7 @@ import jax
 import numpy as np
 
 from jaxident.effects.catalogue import CATALOGUE
-from jaxident.effects.entry import Entry, Parameter
+from jaxident.effects.effect import EffectRecord, Parameter
 from jaxident.errors import InputError
 from jaxident.robot.model import Effect
 
@@ -27,33 +27,32 @@ def check_effects(effects: Sequence[Effect]) -> None:
         check_parameters(CATALOGUE[effect.name], effect.parameters)
 
 
-def check_parameters(entry: Entry, values: dict[str, Any]) -> None:
+def check_parameters(record: EffectRecord, values: dict[str, Any]) -> None:
     """InputError for a name that the effect does not have or a value that it cannot take."""
-    known = {parameter.name: parameter for parameter in entry.parameters}
+    known = {parameter.name: parameter for parameter in record.parameters}
     for name, value in values.items():
         if name not in known:
-            listed = ", ".join(f"{p.name} [{p.unit}]" if p.unit else p.name for p in entry.parameters)
-            raise InputError(f"effect {entry.name!r}: unknown parameter {name!r}; it has {listed}")
+            listed = ", ".join(f"{p.name} [{p.unit}]" if p.unit else p.name for p in record.parameters)
+            raise InputError(f"effect {record.name!r}: unknown parameter {name!r}; it has {listed}")
         if not isinstance(value, jax.core.Tracer):
-            _check_value(entry, known[name], value)
+            _check_value(record, known[name], value)
 
 
 def check_delay(effects: Sequence[Effect], duration: float) -> None:
-    """InputError for a transport delay longer than the log [s]."""
+    """InputError for a command that comes later than the log is long [s]; the first parameter of every effect by which
+    commands arrive late is a time."""
     for effect in effects:
-        delay = effect.parameters.get("delay", 0.0) if effect.name == "transport_delay" else 0.0
-        if not isinstance(delay, jax.core.Tracer) and np.any(np.asarray(delay) > duration):
+        record = CATALOGUE[effect.name]
+        first = record.parameters[0]
+        late = effect.parameters.get(first.name, 0.0) if record.stage == "arrival" else 0.0
+        if not isinstance(late, jax.core.Tracer) and np.any(np.asarray(late) > duration):
             raise InputError(
-                f"effect 'transport_delay': delay is {np.max(delay):g} s, longer than the log of {duration:g} s: "
-                f"nothing would arrive; {_allowed('transport_delay')}"
+                f"effect {effect.name!r}: {first.name} is {np.max(late):g} s, longer than the log of {duration:g} s: "
+                f"nothing would arrive; {first.allowed}"
             )
 
 
-def _allowed(name: str) -> str:
-    return CATALOGUE[name].parameters[0].allowed
-
-
-def _check_value(entry: Entry, parameter: Parameter, value: Any) -> None:
+def _check_value(record: EffectRecord, parameter: Parameter, value: Any) -> None:
     found = np.asarray(value, float)
     bad = np.isnan(found) | (found < parameter.least) | (found > parameter.most)
     if parameter.above:
@@ -62,4 +61,5 @@ def _check_value(entry: Entry, parameter: Parameter, value: Any) -> None:
         bad |= np.isinf(found)
     if bad.any():
         shown = f"{found[bad].flat[0]:g}" if found.ndim else f"{float(found):g}"
-        raise InputError(f"effect {entry.name!r}: {parameter.name} is {shown}; {parameter.allowed} ({entry.equation})")
+        what = f"{parameter.name} is {shown}; {parameter.allowed} ({record.equation})"
+        raise InputError(f"effect {record.name!r}: {what}")

@@ -1,22 +1,28 @@
 """Between the wheels and the ground."""
 
-from typing import Any, NamedTuple
-
 import jax.numpy as jnp
+import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.effects.entry import ALONG, BOTH, LATERAL, UNIT, Entry, Parameter
+from jaxident.effects.effect import (
+    ALONG,
+    BOTH,
+    LATERAL,
+    UNIT,
+    Coordinate,
+    EffectRecord,
+    Parameter,
+    Search,
+    Transform,
+    positive,
+    signed,
+)
+from jaxident.effects.signals import Grip, Motion, Skid
 from jaxident.numerics import safe_divide, sin_cos
 from jaxident.robot.drive import Force
 
-
-class Skid(NamedTuple):
-    """How a wheel slides over a substep: its direction, 1, -1 or 0 while it rolls; the part of the substep that it does
-    so; and how much faster than the ground it turns afterwards [unit]."""
-
-    direction: Any
-    part: Any
-    excess: Any
+SHORTEST = 1e-4
+"""Spin [s] of a wheel below which poses cannot tell it from none, and say nothing about it."""
 
 
 def traction_limit(push: Array, limit: Array) -> Array:
@@ -54,30 +60,113 @@ def lost_push(push: Array, yielded: Array, limit: Array, dry: Array, sliding: Sk
     return (1.0 - dry) * yielded + dry * sliding.part * (sliding.direction * level - push)
 
 
+def _slide(excess, start, middle, step, limit, dry, spin) -> Skid:
+    return skid(excess, start, middle, step, limit, spin)
+
+
+def _lost(push: Array, sliding: Skid, limit: Array, dry: Array, spin: Array) -> Array:
+    return lost_push(push, traction_limit(push, limit) - push, limit, dry, sliding)
+
+
+def _limit(inverse_square: Array) -> Array:
+    """Infinite where there is none."""
+    limited = inverse_square > 0.0
+    return jnp.where(limited, jnp.sqrt(1.0 / jnp.where(limited, inverse_square, 1.0)), jnp.inf)
+
+
+def _slide_fast(excess, start, middle, step, inverse_square, dry, spin) -> Skid:
+    return skid(excess, start, middle, step, _limit(inverse_square), spin)
+
+
+def _lost_fast(push: Array, sliding: Skid, inverse_square: Array, dry: Array, spin: Array) -> Array:
+    return lost_push(push, traction_loss(push, inverse_square), _limit(inverse_square), dry, sliding)
+
+
+def traction_loss(push: Array, inverse_square: Array) -> Array:
+    """L tanh(c / L) - c, smooth in 1 / L^2."""
+    square = inverse_square * push * push
+    small = square < 0.05
+    root = jnp.sqrt(jnp.where(small, 1.0, square))
+    series = square * (-1.0 / 3.0 + square * (2.0 / 15.0 + square * (-17.0 / 315.0 + square * 62.0 / 2835.0)))
+    return push * jnp.where(small, series, jnp.tanh(root) / root - 1.0)
+
+
+def _to_limit(coordinates) -> dict[str, float]:
+    square = max(coordinates["inverse_square"], 0.0)
+    spin = float(coordinates["spin"]) if coordinates["spin"] > SHORTEST else 0.0
+    limit = float(1.0 / np.sqrt(square)) if square > 0.0 else float("inf")
+    return {"limit": limit, "dry": float(coordinates["dry"]), "spin": spin}
+
+
+def _from_limit(parameters) -> dict[str, float]:
+    shape = {key: parameters.get(key, 0.0) for key in ("dry", "spin")}
+    return {"inverse_square": parameters["limit"] ** -2, **shape}
+
+
 def lateral_slip(v: Array, w: Array, slip: Array) -> Array:
     """Speed to the left [m/s]: -c v w, outwards in curves."""
     return -slip * v * w
 
 
-def slope(theta: Array, acceleration: Array, direction: Array) -> Force:
+def slope(motion: Motion, acceleration: Array, direction: Array) -> Force:
     """v' += g cos(theta - theta_0): g of gravity along the fall line, which runs down towards theta_0."""
-    _, cosine = sin_cos(theta - direction)
+    _, cosine = sin_cos(motion.theta - direction)
     return Force(acceleration * cosine, jnp.zeros_like(cosine))
 
 
-ENTRIES = (
-    Entry("traction_limit", "contact",
-          "per wheel c = m - n -> L tanh(c / L); dry: c, beyond +-L +-L until e = 0, tau e' = c -+ L - e",
-          (Parameter("limit", UNIT, float("inf"), (0.2, 2.0), 0.5, least=0.0, above=True),
-           Parameter("dry", "", 0.0, (0.0, 1.0), 0.0, least=0.0, most=1.0, shape=True),
-           Parameter("spin", "s", 0.0, (0.0, 0.1), 0.0, least=0.0, shape=True)), BOTH, ("motor_lag",),
-          "Pacejka 2012, Tire and Vehicle Dynamics, ch. 4 (smooth saturation of the tyre force); dry: Coulomb friction "
-          "under a wheel with inertia", smooth=False, grid=(2.0, 1.0, 0.7, 0.5, 0.3, 0.2)),
-    Entry("lateral_slip", "contact", "sideways speed -c v w", (Parameter("slip", "s", 0.0, (0.0, 0.1), 0.03),),
-          (LATERAL,), ("marker_offset",), "Wong 2008, Theory of Ground Vehicles, ch. 5 (cornering stiffness)"),
-    Entry("slope", "contact", "v' += g cos(theta - theta_0)",
-          (Parameter("acceleration", "m/s^2", 0.0, (0.0, 0.5), 0.05),
-           Parameter("direction", "rad", 0.0, (-3.15, 3.15), 0.7, shape=True)), (ALONG,), (),
-          "gravity on a tilted floor: 0.1 m/s^2 is 0.6 degrees"),
+def slope_by_components(motion: Motion, x: Array, y: Array) -> Force:
+    """`slope` by the components of g along both axes of the field."""
+    sine, cosine = sin_cos(motion.theta)
+    return Force(x * cosine + y * sine, jnp.zeros_like(cosine))
+
+
+def _to_slope(coordinates) -> dict[str, float]:
+    x, y = coordinates["x"], coordinates["y"]
+    return {"acceleration": float(np.hypot(x, y)), "direction": float(np.arctan2(y, x))}
+
+
+def _from_slope(parameters) -> dict[str, float]:
+    g, angle = parameters["acceleration"], parameters["direction"]
+    return {"x": g * np.cos(angle), "y": g * np.sin(angle)}
+
+
+RECORDS = (
+    EffectRecord(
+        name="traction_limit", site="contact", stage="grip",
+        words="the wheels push no harder than their grip on the floor, or the motors' current, allows",
+        equation="per wheel c = m - n -> L tanh(c / L); dry: c, beyond +-L +-L until e = 0, tau e' = c -+ L - e",
+        source="Pacejka 2012, Tire and Vehicle Dynamics, ch. 4 (smooth saturation of the tyre force); dry: Coulomb "
+               "friction under a wheel with inertia",
+        parameters=(Parameter("limit", UNIT, float("inf"), (0.2, 2.0), 0.5, least=0.0, above=True),
+                    Parameter("dry", "", 0.0, (0.0, 1.0), 0.0, least=0.0, most=1.0, shape=True),
+                    Parameter("spin", "s", 0.0, (0.0, 0.1), 0.0, least=0.0, shape=True)),
+        channels=BOTH,
+        act=Grip(_slide, _lost), fast=Grip(_slide_fast, _lost_fast), confused_with=("motor_lag",), smooth=False,
+        grid=(2.0, 1.0, 0.7, 0.5, 0.3, 0.2), sharp=True,
+        search=Search((positive("inverse_square", 100.0),
+                       Coordinate("dry", 0.0, 0.0, 1.0, 1.0, shape=True, stepped=True),
+                       Coordinate("spin", 0.0, 0.0, 0.3, 0.02, shape=True)), Transform(_to_limit, _from_limit),
+                      lambda _: [{}, {"inverse_square": 2.0, "dry": 1.0, "spin": 0.02}]),
+    ),
+    EffectRecord(
+        name="lateral_slip", site="contact", stage="side",
+        words="the robot drifts outwards in curves",
+        equation="sideways speed -c v w",
+        source="Wong 2008, Theory of Ground Vehicles, ch. 5 (cornering stiffness)",
+        parameters=(Parameter("slip", "s", 0.0, (0.0, 0.1), 0.03),), channels=(LATERAL,),
+        act=lateral_slip, confused_with=("marker_offset",),
+        search=Search((signed("slip", 0.5),), on_speeds=True),
+    ),
+    EffectRecord(
+        name="slope", site="contact", stage="body",
+        words="the floor is not level",
+        equation="v' += g cos(theta - theta_0)",
+        source="gravity on a tilted floor: 0.1 m/s^2 is 0.6 degrees",
+        parameters=(Parameter("acceleration", "m/s^2", 0.0, (0.0, 0.5), 0.05),
+                    Parameter("direction", "rad", 0.0, (-3.15, 3.15), 0.7, shape=True)),
+        channels=(ALONG,),
+        act=slope, fast=slope_by_components,
+        search=Search((signed("x", 3.0), signed("y", 3.0)), Transform(_to_slope, _from_slope)),
+    ),
 )  # fmt: skip
-"""Rows of the catalogue for this site."""
+"""The effects of this site."""

@@ -4,30 +4,21 @@ Pushes are kept as mean and slope over a substep, mean + slope (s - 1/2) for s i
 integrals of what the wheels were asked for, so that it switches where it should at any length.
 """
 
-from typing import Any, NamedTuple
+import functools
 
 import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array, Wheels
-from jaxident.effects.actuation import (
-    asymmetric_dead_zone,
-    backlash,
-    direction_gain,
-    input_quantisation,
-    input_saturation,
-    motor_lag,
-)
-from jaxident.effects.time import dead_zone_drift, gain_drift
+from jaxident.effects.effect import EffectRecord
+from jaxident.effects.signals import Push, Substep
+from jaxident.effects.stages import CHAIN, INPUT, acting, static_push
 from jaxident.numerics import safe_divide
 from jaxident.robot.drive import Physical, force, wheel_speeds
 
-PUSHING = (
-    "asymmetric_dead_zone", "direction_gain", "input_saturation", "input_quantisation", "input_rate_limit",
-    "transport_delay", "motor_lag", "backlash", "supply_sag", "gain_drift", "dead_zone_drift",
-)  # fmt: skip
-"""Effects that act before the wheels: beside the dead zones, pushes depend on nothing else but, where wheels coast in
-the play of their gears, on the nominal drive."""
+PUSHING = tuple(effect.name for stage in INPUT for effect in CHAIN[stage] if effect.search is not None)
+"""Effects that act before the wheels: beside the dead zones, pushes depend on nothing else but, by some coordinates
+(`coordinates.BY_DRIVE`), on the nominal drive."""
 SUBSTEPS = 2
 """Per row; the nominal part is exact whatever their number."""
 RUN_UP = 3.0
@@ -37,13 +28,6 @@ NODES = (0.21132486540518713, 0.7886751345948129)
 """Gauss-Legendre on a substep, of third degree."""
 JUST_BEFORE = 1e-9
 """Part of a step by which a delay reads early: its derivative at zero is that of a growing delay."""
-
-
-class Push(NamedTuple):
-    """Mean and slope of what drives the wheels, (rows, runs, substeps, 2) or cut into windows."""
-
-    mean: Any
-    slope: Any
 
 
 def pushes(settings, drive: Physical, dead_zone: Array, t: Array, session: Array, command: Array) -> Push:
@@ -57,32 +41,42 @@ def expected_pushes(
 ) -> tuple[Push, Array | None]:
     """The pushes that are to be expected where each command is lost with a probability, and the deviation of the jolts
     (rows, runs, 2) that losing them makes (`_expected`); with None lost, as `pushes`, and None."""
-    step = jnp.diff(t, axis=0, append=t[-1:] + 1.0)
-    part = step / SUBSTEPS
-    asked, jolt = _asked(settings, dead_zone, t, session, command, part), None
+    part = _lengths(t) / SUBSTEPS
+    arrived = _arrived(settings, t, session)
+    own = _lengths(arrived) / SUBSTEPS
+    asked, jolt = _asked(settings, dead_zone, t, session, command, own), None
     if lost is not None:
         asked, jolt = _expected(asked, lost)
-    asked = _delayed(asked, t, part, settings["transport_delay"]["delay"])
+    asked = _read(asked, arrived, own, t, part)
     return _remembered(settings, drive, asked, part), jolt
 
 
+def _lengths(t: Array) -> Array:
+    """Steps (rows, runs) from each row to the next; that of the last is a second."""
+    return jnp.diff(t, axis=0, append=t[-1:] + 1.0)
+
+
+def _arrived(settings, t: Array, session: Array) -> Array:
+    """When the commands of rows (rows, runs) take effect."""
+    for effect, values in acting("arrival", settings):
+        t = effect.law(t, session, **values)
+    return t
+
+
 def _asked(settings, dead_zone: Array, t: Array, session: Array, command: Array, part: Array) -> Push:
-    """Pushes without delay, play and lag, from every static law in between."""
-    sent = input_saturation(command, settings["input_saturation"]["level"])
-    sent = input_quantisation(sent, settings["input_quantisation"]["step"])
-    inverse = settings["input_rate_limit"]["inverse_rate"]
-    before = _rate_limited(sent, part * SUBSTEPS, inverse)
-    drift, resistance = settings["dead_zone_drift"]["rate"], settings["supply_sag"]["resistance"]
-    difference = _pair(settings, "asymmetric_dead_zone")
-    slope = _pair(settings, "direction_gain")
+    """Pushes of each row from every static law, on a time axis that starts when the row arrives; substeps are `part`
+    long there."""
+    sent = Wheels(command[..., 0], command[..., 1])
+    for effect, values in acting("command", settings):
+        sent = effect.law(sent, **values)
+    slews = [(*one, _slewed(*one, sent, part * SUBSTEPS)) for one in acting("slew", settings)]
 
     def at(elapsed):
         """The pushes `elapsed` [s] (rows, runs) after each row."""
-        u = _towards(before, sent, elapsed[..., None], inverse)
-        time = (session + t + elapsed)[..., None]
-        m = direction_gain(asymmetric_dead_zone(u, dead_zone_drift(dead_zone, time, drift), difference), slope)
-        m = gain_drift(m, time, settings["gain_drift"]["rate"])
-        return m / (1.0 + resistance * jnp.sum(jnp.abs(u), axis=-1, keepdims=True))
+        u = sent
+        for effect, values, before in slews:
+            u = effect.law(before, u, elapsed, **values)
+        return jnp.stack(static_push(settings, dead_zone, u, session + t + elapsed), axis=-1)
 
     means, slopes = [], []
     for number in range(SUBSTEPS):
@@ -107,47 +101,38 @@ def _expected(asked: Push, lost: Array) -> tuple[Push, Array]:
     return Push(mean, slope), change * jnp.sqrt(lost) / (1.0 - lost)
 
 
-def _pair(settings, name: str) -> Array:
-    return jnp.stack([jnp.asarray(settings[name][side]) for side in ("right", "left")])
-
-
-def _towards(now: Array, goal: Array, time: Array, inverse: Array) -> Array:
-    """The command some time [s] after `goal` was asked for, when it moves by 1 / inverse [unit/s] at most."""
-    change = goal - now
-    needed = jnp.abs(change) * inverse
-    return now + change * jnp.where(needed > time, safe_divide(time, needed, 1.0), 1.0)
-
-
-def _rate_limited(sent: Array, step: Array, inverse: Array) -> Array:
-    """The command (rows, runs, 2) that the limit has reached at each row."""
+def _slewed(effect: EffectRecord, values, sent: Wheels, step: Array) -> Wheels:
+    """The command (rows, runs) that a slew has reached at each row."""
 
     def body(now, row):
         goal, own = row
-        return _towards(now, goal, own[:, None], inverse), now
+        return effect.law(now, goal, own, **values), now
 
-    return jax.lax.scan(body, jnp.zeros_like(sent[0]), (sent, step))[1]
+    still = Wheels(*(jnp.zeros_like(u[0]) for u in sent))
+    return jax.lax.scan(body, still, (sent, step))[1]
 
 
-def _delayed(asked: Push, t: Array, part: Array, delay: Array) -> Push:
-    """Every push `delay` [s] later; nothing is asked for before the first row."""
-    mean, slope = asked
-    length = _flat(jnp.broadcast_to(part[:, :, None], mean.shape[:3]))
-    mean, slope = _flat(mean), _flat(slope)
-    nodes = t[:1] + jnp.concatenate([jnp.zeros_like(length[:1]), jnp.cumsum(length, axis=0)])
-    size = length[..., None]
-    first = _integral(size * mean)
+def _read(asked: Push, arrived: Array, own: Array, t: Array, part: Array) -> Push:
+    """Pushes that were asked for on the time axis of arrivals (rows, runs), substeps `own` long, as means and slopes
+    over the substeps `part` of the rows themselves; nothing is asked for before the first row arrives."""
+    mean, slope = (_flat(values) for values in asked)
+    given, size = (_flat(jnp.broadcast_to(each[:, :, None], asked.mean.shape[:3])) for each in (own, part))
+    nodes, starts = t[:1] + _integral(size), arrived[:1] + _integral(given)[:-1]
+    given, size = given[..., None], size[..., None]
+    first = _integral(given * mean)
     # exact for a push that varies within a substep
-    second = _integral(size * first[:-1] + size**2 * (0.5 * mean - slope / 12.0))
-    early = nodes - (delay + JUST_BEFORE * length[0])
-    place = jax.vmap(lambda a, v: jnp.searchsorted(a, v, side="right") - 1, in_axes=1, out_axes=1)(nodes[:-1], early)
-    known = jnp.concatenate([first[:-1], second[:-1], mean, slope, nodes[:-1, :, None], size], axis=-1)
-    own = jnp.take_along_axis(known, jnp.maximum(place, 0)[..., None], axis=0)
-    elapsed = early[..., None] - own[..., 8:9]
-    s = elapsed / own[..., 9:]
-    once = own[..., 0:2] + elapsed * (own[..., 4:6] + own[..., 6:8] * 0.5 * (s - 1.0))
+    second = _integral(given * first[:-1] + given**2 * (0.5 * mean - slope / 12.0))
+    early = nodes - JUST_BEFORE * part[0]
+    place = jax.vmap(lambda a, v: jnp.searchsorted(a, v, side="right") - 1, in_axes=1, out_axes=1)(starts, early)
+    known = jnp.concatenate([first[:-1], second[:-1], mean, slope, starts[..., None], given], axis=-1)
+    found = jnp.take_along_axis(known, jnp.maximum(place, 0)[..., None], axis=0)
+    elapsed = early[..., None] - found[..., 8:9]
+    s = safe_divide(elapsed, found[..., 9:], 0.0)
+    once = found[..., 0:2] + elapsed * (found[..., 4:6] + found[..., 6:8] * 0.5 * (s - 1.0))
     twice = (
-        own[..., 2:4] + elapsed * own[..., 0:2] + elapsed**2 * (0.5 * own[..., 4:6] + own[..., 6:8] * (s / 6.0 - 0.25))
-    )
+        found[..., 2:4] + elapsed * found[..., 0:2]
+        + elapsed**2 * (0.5 * found[..., 4:6] + found[..., 6:8] * (s / 6.0 - 0.25))
+    )  # fmt: skip
     inside = (place >= 0)[..., None]
     once, twice = jnp.where(inside, once, 0.0), jnp.where(inside, twice, 0.0)
     mean = jnp.diff(once, axis=0) / size
@@ -166,45 +151,31 @@ def _integral(pieces: Array) -> Array:
 
 
 def _remembered(settings, drive: Physical, asked: Push, part: Array) -> Push:
-    """Pushes (rows * substeps, runs, 2) behind the play of the gears and the lag of the motors, as (rows, runs,
-    substeps, 2)."""
-    mean, slope = asked
+    """Pushes (rows * substeps, runs, 2) behind the gears, as (rows, runs, substeps, 2)."""
     rows, runs = part.shape
     size = jnp.repeat(part, SUBSTEPS, axis=0)[..., None]
-    mean, slope = _played(_pair(settings, "backlash"), settings["backlash"]["coasting"], drive, mean, slope, size)
-    mean, slope = _lagged(settings["motor_lag"]["time_constant"], mean, slope, size)
-    return Push(*(x.reshape(rows, SUBSTEPS, runs, 2).transpose(0, 2, 1, 3) for x in (mean, slope)))
+    for effect, values in acting("gear", settings):
+        run = functools.partial(scanned, effect) if effect.fast is None else effect.fast
+        asked = run(asked, drive, size, **values)
+    return Push(*(x.reshape(rows, SUBSTEPS, runs, 2).transpose(0, 2, 1, 3) for x in asked))
 
 
-def _played(width: Array, coasting: Array, drive: Physical, mean, slope, size) -> tuple[Array, Array]:
-    """What passes the play: for a first part of some substeps no more than what lets the wheels coast, whose speeds are
-    those of the nominal drive."""
-    decay = jnp.exp(-drive.rate * size)
+def scanned(effect: EffectRecord, asked: Push, drive: Physical, size: Array, **values) -> Push:
+    """An effect of stage `gear` over whole runs (points, runs, 2) by its law of one substep; speeds of the wheels are
+    those of the nominal drive at the start of each."""
 
     def body(carry, now):
-        position, speeds = carry
-        mean, own, decay = now
-        across = speeds[:, ::-1] * drive.coupling
-        coasts = coasting * jnp.stack(wheel_speeds(drive, *speeds.T), axis=-1)
-        position, free = backlash(position, mean - coasts, own, width)
-        pull = force(drive, Wheels(*(free * coasts + (1.0 - free) * mean).T))
-        steady = (jnp.stack(pull, axis=-1) + across) / drive.rate
-        return (position, steady + (speeds - steady) * decay), (free, coasts)
+        memory, v, w = carry
+        mean, slope, step = now
+        step = step[:, 0]
+        own = Substep(step, lambda _: wheel_speeds(drive, v, w))
+        passed, memory = effect.act(Push(Wheels(*mean.T), Wheels(*slope.T)), memory, own, **values)
+        pull = force(drive, passed.mean)
+        steady_v = (pull.along + drive.coupling[0] * w) / drive.rate[0]
+        steady_w = (pull.heading + drive.coupling[1] * v) / drive.rate[1]
+        v = steady_v + (v - steady_v) * jnp.exp(-drive.rate[0] * step)
+        w = steady_w + (w - steady_w) * jnp.exp(-drive.rate[1] * step)
+        return (memory, v, w), [jnp.stack(part, axis=-1) for part in passed]
 
-    still = jnp.zeros_like(mean[0])
-    free, coasts = jax.lax.scan(body, (still, still), (mean, size, decay))[1]
-    driving, turning = 1.0 - free, mean - coasts
-    return coasts + driving * turning, driving * slope + 6.0 * free * driving * turning
-
-
-def _lagged(time_constant: Array, mean: Array, slope: Array, size: Array) -> tuple[Array, Array]:
-    """What passes the lag; it is linear, so that the response to a unit gap serves every substep."""
-    decay, average, rising, kept = motor_lag(jnp.ones_like(size), jnp.zeros_like(size), size, time_constant)
-
-    def body(last, now):
-        goal, own = now
-        return goal + (last - goal) * own, last
-
-    last = jax.lax.scan(body, jnp.zeros_like(mean[0]), (mean, decay))[1]
-    gap = last - mean
-    return mean + gap * average, gap * rising + (1.0 - kept) * slope
+    still = jnp.zeros_like(asked.mean[0, :, 0])
+    return Push(*jax.lax.scan(body, (Wheels(still, still), still, still), (*asked, size))[1])

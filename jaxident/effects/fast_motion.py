@@ -5,17 +5,18 @@ rule, of second order: Hochbruck and Ostermann 2010, Acta Numerica 19). Position
 elementwise: states may have any shape, rows of many stretches side by side on the last axis.
 """
 
+import functools
+import operator
 from typing import Any, NamedTuple
 
-import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array, Pose, State, Wheels
-from jaxident.effects import camera
-from jaxident.effects.contact import Skid, lateral_slip, lost_push, skid
-from jaxident.effects.drive import friction_level, mass_offset, quadratic_drag, slide, turn_loss
 from jaxident.effects.fast_input import SUBSTEPS
-from jaxident.numerics import hold_integrals, safe_divide, sin_cos
+from jaxident.effects.friction import slide
+from jaxident.effects.signals import Motion
+from jaxident.effects.stages import CHAIN, acting, friction_level, seen
+from jaxident.numerics import hold_integrals, sin_cos
 from jaxident.robot.drive import Physical, to_wheels, wheel_speeds
 
 
@@ -49,13 +50,12 @@ def lags_of(drive: Physical, part: Array) -> list[Lag]:
 
 def report(settings, x: Array, y: Array, theta: Array) -> Pose:
     """What the camera makes of true poses."""
-    pose = Pose(x, y, theta)
-    pose = camera.marker_offset(pose, **settings["marker_offset"])
-    pose = camera.heading_offset(pose, **settings["heading_offset"])
-    strength, *pulls = (settings["lens_distortion"][key] for key in ("strength", "pull_x", "pull_y"))
-    pose = camera.lens_distortion(pose, strength, *(safe_divide(pull, strength, 0.0) for pull in pulls))
-    pose = camera.camera_tilt(pose, **settings["camera_tilt"])
-    return camera.camera_scale(pose, **settings["camera_scale"])
+    return seen(settings, Pose(x, y, theta), fast=True)
+
+
+def rolling(like: Array) -> list[Array]:
+    """By how much wheels that roll turn faster than the ground: both wheels, for each effect that lets them slide."""
+    return [jnp.zeros_like(like)] * (2 * len(CHAIN["grip"]))
 
 
 def advance_row(settings, drive: Physical, state: State, excess: list[Array], row: Row, slip=(0.0, 0.0)):
@@ -63,10 +63,10 @@ def advance_row(settings, drive: Physical, state: State, excess: list[Array], ro
 
     slip: a random acceleration along [m/s^2] and in heading [rad/s^2], held over the row, that asks nothing of the
     wheels' grip."""
-    loss, instant = settings["payload_change"]["loss"], settings["payload_change"]["instant"]
     for number in range(SUBSTEPS):
         middle = row.begin + (number + 0.5) * row.part
-        lightness = 1.0 - loss * jax.nn.sigmoid((middle - instant) / row.part)
+        loads = [effect.law(middle, row.part, **values) for effect, values in acting("load", settings)]
+        lightness = functools.reduce(operator.mul, loads)
         push = _force(drive, row.mean[number]), _force(drive, row.slope[number])
         state, excess = _substep(settings, drive, state, excess, push, slip, row.part, row.lags, lightness)
     return state, excess
@@ -90,15 +90,14 @@ def _substep(settings, drive: Physical, state: State, excess, push, slip, part: 
     pull = [f - lightness * g for f, g in zip(pull, rub, strict=True)]
     middle = _ahead(state, lag_v.half, lag_w.half, pull, 0.5 * part, None)
     end = _ahead(state, lag_v.whole, lag_w.whole, pull, part, ramp)
-    sliding_out = settings["lateral_slip"]["slip"]
     x_rate, y_rate = 0.0, 0.0
     for weight, (angle, speed, turning) in ((1.0, (theta, v, w)), (4.0, middle), (1.0, end)):
         sine, cosine = sin_cos(angle)
-        left = lateral_slip(speed, turning, sliding_out)
+        left = sum(effect.law(speed, turning, **values) for effect, values in acting("side", settings))
         x_rate = x_rate + weight * (speed * cosine - left * sine)
         y_rate = y_rate + weight * (speed * sine + left * cosine)
     moved = State(x + part / 6.0 * x_rate, y + part / 6.0 * y_rate, *end)
-    return moved, [own.excess for own in sliding]
+    return moved, [own.excess for wheels in sliding for own in wheels]
 
 
 def _force(drive: Physical, m) -> list[Array]:
@@ -131,47 +130,26 @@ def _asked(drive: Physical, v: Array, w: Array, pull, ramp, place: float) -> Whe
     return to_wheels(drive, *_linear(drive, v, w, pull, ramp, place))
 
 
-def _limit(settings) -> Array:
-    """That of traction; infinite where there is none."""
-    inverse = settings["traction_limit"]["inverse_square"]
-    return jnp.where(inverse > 0.0, jnp.sqrt(1.0 / jnp.where(inverse > 0.0, inverse, 1.0)), jnp.inf)
-
-
-def _sliding(settings, excess, start: Wheels, middle: Wheels, part: Array) -> list[Skid]:
-    """How wheels slide over a substep, given their net pushes at its start and in its middle."""
-    limit, spin = _limit(settings), settings["traction_limit"]["spin"]
-    return [skid(*own, part, limit, spin) for own in zip(excess, start, middle, strict=True)]
+def _sliding(settings, excess, start: Wheels, middle: Wheels, part: Array) -> list:
+    """How both wheels slide over a substep by each grip, given their net pushes at its start and in its middle."""
+    return [
+        [effect.law.slide(*own, part, **values) for own in zip(excess[2 * k : 2 * k + 2], start, middle, strict=True)]
+        for k, (effect, values) in enumerate(acting("grip", settings))
+    ]
 
 
 def _added(settings, drive: Physical, now, pull, ramp, place: float, lightness: Array, sliding) -> list[Array]:
     """Accelerations by effects, dry friction left out."""
     theta, v, w = now
-    across = drive.coupling[0] * w, drive.coupling[1] * v
     along, heading = _linear(drive, v, w, pull, ramp, place)
-    asked, law = to_wheels(drive, along, heading), settings["traction_limit"]
-    yielded = [_traction_loss(n, law["inverse_square"]) for n in asked]
-    wheels = zip(asked, yielded, sliding, strict=True)
-    lost = _force(drive, [lost_push(n, m, _limit(settings), law["dry"], own) for n, m, own in wheels])
-    terms = [
-        quadratic_drag(v, w, **settings["quadratic_drag"]),
-        mass_offset(v, w, **settings["mass_offset"]),
-        turn_loss(v, w, **settings["turn_loss"]),
-    ]
-    sine, cosine = sin_cos(theta)
-    incline = settings["slope"]["x"] * cosine + settings["slope"]["y"] * sine
-    return [
-        across[0] + sum(t.along for t in terms) + incline + lightness * lost[0] + (lightness - 1.0) * along,
-        across[1] + sum(t.heading for t in terms) + lightness * lost[1] + (lightness - 1.0) * heading,
-    ]
-
-
-def _traction_loss(push: Array, inverse_square: Array) -> Array:
-    """L tanh(c / L) - c, smooth in 1 / L^2."""
-    square = inverse_square * push * push
-    small = square < 0.05
-    root = jnp.sqrt(jnp.where(small, 1.0, square))
-    series = square * (-1.0 / 3.0 + square * (2.0 / 15.0 + square * (-17.0 / 315.0 + square * 62.0 / 2835.0)))
-    return push * jnp.where(small, series, jnp.tanh(root) / root - 1.0)
+    asked = to_wheels(drive, along, heading)
+    found = [drive.coupling[0] * w + (lightness - 1.0) * along, drive.coupling[1] * v + (lightness - 1.0) * heading]
+    for (effect, values), wheels in zip(acting("grip", settings), sliding, strict=True):
+        lost = [effect.law.lost(n, own, **values) for n, own in zip(asked, wheels, strict=True)]
+        found = [have + lightness * more for have, more in zip(found, _force(drive, lost), strict=True)]
+    for effect, values in acting("body", settings):
+        found = [have + more for have, more in zip(found, effect.law(Motion(v, w, theta), **values), strict=True)]
+    return found
 
 
 def _friction(settings, drive: Physical, before, free, lags, lightness: Array) -> list[Array]:
@@ -180,10 +158,5 @@ def _friction(settings, drive: Physical, before, free, lags, lightness: Array) -
     once_v, once_w = lags[0].whole[1] * lightness, lags[1].whole[1] * lightness
     right, left = (wheel_speeds(drive, p * once_v, q * once_w) for p, q in ((a, c), (b, d)))
     mobility = (right.right, left.right), (right.left, left.left)
-    coulomb, stiction = settings["coulomb_friction"], settings["stiction"]
-
-    def level(n: Wheels) -> Wheels:
-        sides = zip(n, Wheels._fields, strict=True)
-        return Wheels(*(friction_level(m, coulomb[side], stiction[side], stiction["fade"]) for m, side in sides))
-
+    level = functools.partial(friction_level, settings)
     return _force(drive, slide(wheel_speeds(drive, *before), wheel_speeds(drive, *free), mobility, level))

@@ -7,27 +7,23 @@ import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array, Pose, State, Wheels
-from jaxident.effects import camera
-from jaxident.effects.actuation import input_quantisation, input_saturation, lost_commands
 from jaxident.effects.catalogue import CATALOGUE, by_name
 from jaxident.effects.input_chain import at_rest, push
 from jaxident.effects.intervals import Grid, make_grid
-from jaxident.effects.substep import ADDED, FRICTION, Motion, after_half, move, solve_half
+from jaxident.effects.signals import Motion
+from jaxident.effects.stages import CORNERED, MOVING, acting, holds, seen
+from jaxident.effects.substep import after_half, move, solve_half
 from jaxident.robot.drive import Force, Physical, advance, force, hold, wheel_speeds
-from jaxident.robot.noise import Noise, correlated, draw_noise, draw_white, observe, slip
+from jaxident.robot.noise import Noise, draw_noise, draw_white, observe, slip
 
 SUBSTEPS = 4
 """Per camera interval; enough for 1e-6 m in a run of 200 samples where the effects are smooth."""
 
 SHARP_SUBSTEPS = 16
-"""Where an effect has corners within a sample (friction, stiction, play, slew, the |w| of turn_loss, a wheel that
-begins to slide)."""
-
-SHARP = FRICTION | {"turn_loss", "backlash", "input_rate_limit", "traction_limit"}
-MOVING = (
-    FRICTION | ADDED | {"backlash", "input_rate_limit", "motor_lag", "lateral_slip", "gain_drift", "dead_zone_drift"}
-)
-"""Without these the force is held and the drive linear: its exact solution needs no substeps."""
+"""Where an effect has corners within a sample (friction, play, slew, the |w| of a castor, a wheel that begins to
+slide)."""
+KEYS = 5
+"""Of effects that draw, apart from that of the noise; `Chance.keys` are their numbers."""
 
 EVERY = frozenset(CATALOGUE)
 Settings = Mapping[str, dict[str, Any]]
@@ -68,21 +64,24 @@ def run_undisturbed(
 ) -> Pose:
     """`run_full` before `disturb`: poses (samples,) as the camera would report them if it made no random error."""
     settings = _settings(vector, parts)
-    sent = _sent(settings, command, None if key is None else _keys(key)[0])
+    sent = _sent(settings, command, None if key is None else _keys(key))
     grid = _grid(settings, t, sent, session_time, substeps)
     push_aside = None
     if key is not None and noise is not None:
         drawn = slip(noise, draw_noise(key, len(t)), jnp.append(jnp.diff(t), 1.0))
         push_aside = Force(*(f[grid.row] for f in drawn))
     states = _scan(settings, drive, dead_zone, grid, push_aside, start, session_time - t[0])
-    return _optics(settings, Pose(*(column[grid.at_row] for column in states.pose)))
+    return seen(settings, Pose(*(column[grid.at_row] for column in states.pose)))
 
 
 def disturb(pose: Pose, vector: Array, t: Array, *, noise: Noise | None, key: Array, parts: frozenset[str]) -> Pose:
     """The camera's random errors on poses (samples,): its noise, then those among the effects."""
     if noise is not None:
         pose = observe(pose, noise, draw_noise(key, len(t)), jnp.diff(t), draw_white(noise, key, len(t)))
-    return _disturbed(_settings(vector, parts), pose, jnp.diff(t), _keys(key)[1:])
+    keys, settings = _keys(key), _settings(vector, parts)
+    for effect, values in acting("frames", settings):
+        pose = effect.act(pose, jnp.diff(t), effect.own_keys(keys), **values)
+    return pose
 
 
 def _settings(vector: Array, parts: frozenset[str]) -> Settings:
@@ -91,34 +90,32 @@ def _settings(vector: Array, parts: frozenset[str]) -> Settings:
 
 def _keys(key: Array) -> Array:
     """Keys of the random effects, apart from that of the noise."""
-    return jax.random.split(jax.random.fold_in(key, 1), 5)
+    return jax.random.split(jax.random.fold_in(key, 1), KEYS)
 
 
 def substeps_for(parts: frozenset[str]) -> int:
     """Substeps that give 1e-6 m over 200 samples, with corners 1e-4 m."""
-    return SHARP_SUBSTEPS if parts & SHARP else SUBSTEPS
+    return SHARP_SUBSTEPS if parts & CORNERED else SUBSTEPS
 
 
-def _sent(settings: Settings, command: Wheels, key: Array | None) -> Wheels:
+def _sent(settings: Settings, command: Wheels, keys: Array | None) -> Wheels:
     """The commands (samples,) that enter the delay line."""
     sent = Wheels(*(jnp.asarray(u) for u in command))
-    if "lost_commands" in settings and key is not None:
-        lost = jax.random.uniform(key, jnp.shape(sent.right)) < settings["lost_commands"]["probability"]
-        sent = Wheels(*(lost_commands(u, lost) for u in sent))
-    if "input_saturation" in settings:
-        sent = Wheels(*(input_saturation(u, settings["input_saturation"]["level"]) for u in sent))
-    if "input_quantisation" in settings:
-        sent = Wheels(*(input_quantisation(u, settings["input_quantisation"]["step"]) for u in sent))
+    for effect, values in acting("command", settings):
+        if effect.chance is None:
+            sent = effect.act(sent, **values)
+        elif keys is not None:
+            sent = effect.act(sent, effect.own_keys(keys), **values)
     return sent
 
 
 def _grid(settings: Settings, t: Array, sent: Wheels, session_time: Array, substeps: int) -> Grid:
     """The grid that these effects need."""
-    delay = settings["transport_delay"]["delay"] if "transport_delay" in settings else None
-    change = None
-    if "payload_change" in settings:
-        change = settings["payload_change"]["instant"] - session_time + t[0]
-    return make_grid(t, sent, substeps if settings.keys() & MOVING else 1, delay=delay, change=change)
+    arrivals = t if holds(settings, "arrival") else None
+    for effect, values in acting("arrival", settings):
+        arrivals = effect.act(arrivals, session_time - t[0], **values)
+    changes = [effect.act.instant(**values) - session_time + t[0] for effect, values in acting("load", settings)]
+    return make_grid(t, sent, substeps if settings.keys() & MOVING else 1, arrivals=arrivals, changes=changes)
 
 
 def _scan(settings, drive, dead_zone, grid: Grid, slips: Force | None, start: State, offset: Array) -> State:
@@ -149,37 +146,6 @@ def _scan(settings, drive, dead_zone, grid: Grid, slips: Force | None, start: St
     like = jnp.zeros_like(grid.start, shape=())
     begin = State(*(jnp.asarray(s, like.dtype) for s in start))
     inputs = (grid.start + offset, length, grid.command, slips, grid.changed, solved)
-    still = Wheels(like, like)
-    (last, _, _), states = jax.lax.scan(interval, (begin, at_rest(settings, like), still), inputs)
+    rolling = tuple(Wheels(like, like) for _ in acting("grip", settings))
+    (last, _, _), states = jax.lax.scan(interval, (begin, at_rest(settings, like), rolling), inputs)
     return State(*(jnp.append(column, end) for column, end in zip(states, last, strict=True)))
-
-
-def _optics(settings: Settings, pose: Pose) -> Pose:
-    """What the camera makes of true poses without drawing anything."""
-    for act in (
-        camera.marker_offset,
-        camera.heading_offset,
-        camera.lens_distortion,
-        camera.camera_tilt,
-        camera.camera_scale,
-    ):
-        if act.__name__ in settings:
-            pose = act(pose, **settings[act.__name__])
-    return pose
-
-
-def _disturbed(settings: Settings, pose: Pose, step: Array, keys: Array) -> Pose:
-    """Random effects of the camera; step [s] (samples - 1,)."""
-    shape = len(pose.x)
-    if "coloured_noise" in settings:
-        law = settings["coloured_noise"]
-        draws = jax.random.normal(keys[0], (3, shape))
-        error = Pose(*(correlated(draw, step, law["correlation_time"]) for draw in draws))
-        pose = camera.coloured_noise(pose, error, law["position"], law["heading"])
-    if "outliers" in settings:
-        error = Pose(*jax.random.normal(keys[2], (3, shape)))
-        chance = jax.random.uniform(keys[1], (2, shape))[0]
-        pose = camera.outliers(pose, chance, error, **settings["outliers"])
-    if "frozen_frames" in settings:
-        pose = camera.frozen_frames(pose, jax.random.uniform(keys[1], (2, shape))[1], **settings["frozen_frames"])
-    return pose

@@ -6,25 +6,19 @@ SIAM J. Numer. Anal. 4): where no effect is in force N is exactly zero, and so i
 half a substep, taken twice. Effects that are not in the settings are not computed.
 """
 
+import functools
+import operator
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array, State, Wheels
-from jaxident.effects.contact import Skid, lateral_slip, lost_push, skid, slope, traction_limit
-from jaxident.effects.drive import dry_friction, friction_level, mass_offset, quadratic_drag, turn_loss
-from jaxident.effects.input_chain import Push
-from jaxident.effects.time import payload_change
+from jaxident.effects.friction import dry_friction
+from jaxident.effects.signals import Motion, Push
+from jaxident.effects.stages import acting, friction_level, holds
 from jaxident.numerics import sin_cos
 from jaxident.robot.drive import Force, Physical, Response, force, responses, to_wheels, weigh, wheel_speeds
-
-
-class Motion(NamedTuple):
-    """Speeds and heading, or a departure from them, or its rate of change."""
-
-    v: Any
-    w: Any
-    theta: Any
 
 
 class Half(NamedTuple):
@@ -35,11 +29,6 @@ class Half(NamedTuple):
     turn: Response
 
 
-FRICTION = {"coulomb_friction", "stiction"}
-ADDED = {"quadratic_drag", "mass_offset", "turn_loss", "slope", "traction_limit", "payload_change"}
-"""Effects that make the drive depart from the linear one under a held force."""
-
-
 def solve_half(drive: Physical, step: Array) -> Half:
     """The exact solution over half a substep of any shape."""
     ((v, w, turn),) = responses(drive, 0.5 * step, (1.0,))
@@ -47,10 +36,10 @@ def solve_half(drive: Physical, step: Array) -> Half:
 
 
 def move(
-    settings, drive: Physical, state: State, excess: Wheels, push: Push, slip: Force | None, changed, half: Half, h
-) -> tuple[State, Wheels]:
-    """The state one substep of h [s] later, under a push, a random slip (acceleration) and before or after a payload
-    change, and by how much each wheel then turns faster than the ground; `excess`: by how much it did.
+    settings, drive: Physical, state: State, excess: tuple, push: Push, slip: Force | None, changed, half: Half, h
+) -> tuple[State, tuple]:
+    """The state one substep of h [s] later, under a push, a random slip (acceleration) and before or after what loads
+    have `changed`, and by how much each wheel then turns faster than the ground; `excess`: by how much it did.
 
     Friction, held over the substep, moves what the departure depends on, and the other way round: it is settled with
     a first guess of the departure, and again with the departure that follows.
@@ -59,35 +48,45 @@ def move(
     if slip is not None:
         pull = Force(pull.along + slip.along, pull.heading + slip.heading)
     ramp = None if push.slope is None else force(drive, push.slope)
-    lightness = None if changed is None else payload_change(changed, settings["payload_change"]["ratio"])
-    departs = ramp is not None or bool(settings.keys() & ADDED)
-    start, sliding = Motion(state.v, state.w, state.theta), None
+    lightness = _lightness(settings, changed)
+    rubs, departs = holds(settings, "friction"), holds(settings, "load", "grip", "body")
+    start = Motion(state.v, state.w, state.theta)
+    sliding: tuple = ()
 
     def departure(part: float, now: Motion) -> Motion:
         later = None if ramp is None else Force(*((part - 0.5) * f for f in ramp))
         return _departure(settings, drive, now, pull, later, lightness, sliding)
 
-    if "traction_limit" in settings:
+    if holds(settings, "grip"):
         first = _asked(drive, start, pull, ramp, -0.5)
         sliding = _sliding(settings, excess, first, first, h)
         end = _sum(after_half(half, after_half(half, start, pull), pull), (1.0, _guess(departure, start, half, h)))
         sliding = _sliding(settings, excess, first, _asked(drive, end, pull, ramp, 0.5), h)
-        excess = Wheels(*(own.excess for own in sliding))
+        excess = tuple(Wheels(*(own.excess for own in wheels)) for wheels in sliding)
     held, path = pull, None
-    if settings.keys() & FRICTION:
-        guess = _guess(departure, start, half, h) if settings.keys() & ADDED else None
+    if rubs:
+        guess = _guess(departure, start, half, h) if departs else None
         held = _rubbed(settings, drive, start, pull, guess, lightness, half)
-    if departs:
+    if departs or ramp is not None:
         path = _runge_kutta(drive, departure, start, held, half, h)
-        if settings.keys() & FRICTION:
+        if rubs:
             held = _rubbed(settings, drive, start, pull, path[2], lightness, half)
     return _arrive(settings, drive, state, held, path, half, h), excess
 
 
-def _sliding(settings, excess: Wheels, first: Wheels, last: Wheels, h: Array) -> list[Skid]:
-    """How both wheels slide over the substep, given their net pushes at its start and its end."""
-    law, sides = settings["traction_limit"], zip(excess, first, last, strict=True)
-    return [skid(e, c, 0.5 * (c + later), h, law["limit"], law["spin"]) for e, c, later in sides]
+def _lightness(settings, changed: tuple) -> Array | None:
+    """What accelerations are multiplied with by all loads; None without any."""
+    pairs = zip(acting("load", settings), changed, strict=True)
+    factors = [effect.act.factor(now, **values) for (effect, values), now in pairs]
+    return functools.reduce(operator.mul, factors) if factors else None
+
+
+def _sliding(settings, excess: tuple, first: Wheels, last: Wheels, h: Array) -> tuple:
+    """How both wheels slide over the substep by each grip, given their net pushes at its start and its end."""
+    return tuple(
+        [effect.act.slide(e, c, 0.5 * (c + later), h, **values) for e, c, later in zip(own, first, last, strict=True)]
+        for (effect, values), own in zip(acting("grip", settings), excess, strict=True)
+    )
 
 
 def _asked(drive: Physical, now: Motion, pull: Force, ramp: Force | None, place: float) -> Wheels:
@@ -104,37 +103,26 @@ def _guess(departure, start: Motion, half: Half, h: Array) -> Motion:
 
 
 def _departure(
-    settings, drive: Physical, now: Motion, pull: Force, ramp: Force | None, lightness, sliding: list[Skid] | None
+    settings, drive: Physical, now: Motion, pull: Force, ramp: Force | None, lightness: Array | None, sliding: tuple
 ) -> Motion:
-    """N: acceleration with all effects less that of the linear drive under the held pull; `sliding` of dry wheels."""
+    """N: acceleration with all effects less that of the linear drive under the held pull; `sliding` by each grip."""
     v, w, theta = now
     along, heading = jnp.zeros_like(v), jnp.zeros_like(w)
     if ramp is not None:
         along, heading = ramp
-    if "traction_limit" in settings or lightness is not None:
+    if sliding or lightness is not None:
         asked = Force(*(a + b + c for a, b, c in zip(_linear(drive, v, w), pull, (along, heading), strict=True)))
-        if "traction_limit" in settings:
-            lost = force(drive, _not_taken(settings["traction_limit"], to_wheels(drive, *asked), sliding))
-            factor = 1.0 if lightness is None else lightness
+        factor = 1.0 if lightness is None else lightness
+        for (effect, values), skids in zip(acting("grip", settings), sliding, strict=True):
+            pairs = zip(to_wheels(drive, *asked), skids, strict=True)
+            lost = force(drive, Wheels(*(effect.act.lost(c, own, **values) for c, own in pairs)))
             along, heading = along + factor * lost.along, heading + factor * lost.heading
         if lightness is not None:
             along, heading = along + (lightness - 1.0) * asked.along, heading + (lightness - 1.0) * asked.heading
-    for more in _smooth(settings, v, w, theta):
+    for effect, values in acting("body", settings):
+        more = effect.act(now, **values)
         along, heading = along + more.along, heading + more.heading
     return Motion(along, heading, jnp.zeros_like(theta))
-
-
-def _not_taken(law, wheels: Wheels, sliding: list[Skid] | None) -> Wheels:
-    """What the ground does not take of each wheel's net push, negative."""
-    limit, dry = law["limit"], law["dry"]
-    pairs = zip(wheels, sliding or [Skid(0.0, 0.0, 0.0)] * 2, strict=True)
-    return Wheels(*(lost_push(c, traction_limit(c, limit) - c, limit, dry, own) for c, own in pairs))
-
-
-def _smooth(settings, v: Array, w: Array, theta: Array) -> list[Force]:
-    """Accelerations that depend on the motion alone."""
-    laws: tuple[Any, ...] = (quadratic_drag, (v, w)), (mass_offset, (v, w)), (turn_loss, (v, w)), (slope, (theta,))
-    return [law(*now, **settings[law.__name__]) for law, now in laws if law.__name__ in settings]
 
 
 def _runge_kutta(drive: Physical, departure, start: Motion, held: Force, half: Half, h: Array):
@@ -168,29 +156,30 @@ def _arrive(settings, drive: Physical, state: State, held: Force, path, half: Ha
         end = _sum(end, (1.0, d))
         rates = [Force(rates[0].along + first.v, rates[0].heading + first.w),
                  Force(rates[1].along + last.v, rates[1].heading + last.w)]  # fmt: skip
-    slip = settings["lateral_slip"]["slip"] if "lateral_slip" in settings else None
-    (x0, y0), (x1, y1), (x2, y2) = (_velocity(now, slip) for now in (start, middle, end))
-    (a0, b0), (a2, b2) = (_velocity_rate(now, rate, slip) for now, rate in zip((start, end), rates, strict=True))
+    (x0, y0), (x1, y1), (x2, y2) = (_velocity(settings, now) for now in (start, middle, end))
+    (a0, b0), (a2, b2) = (_velocity_rate(settings, *pair) for pair in zip((start, end), rates, strict=True))
     x = state.x + h * ((7.0 * (x0 + x2) + 16.0 * x1) / 30.0 + h / 60.0 * (a0 - a2))
     y = state.y + h * ((7.0 * (y0 + y2) + 16.0 * y1) / 30.0 + h / 60.0 * (b0 - b2))
     return State(x, y, end.theta, end.v, end.w)
 
 
-def _velocity(now: Motion, slip: Array | None) -> tuple[Array, Array]:
+def _velocity(settings, now: Motion) -> tuple[Array, Array]:
     sine, cosine = sin_cos(now.theta)
-    if slip is None:
-        return now.v * cosine, now.v * sine
-    side = lateral_slip(now.v, now.w, slip)
-    return now.v * cosine - side * sine, now.v * sine + side * cosine
+    x, y = now.v * cosine, now.v * sine
+    for effect, values in acting("side", settings):
+        left = effect.act(now.v, now.w, **values)
+        x, y = x - left * sine, y + left * cosine
+    return x, y
 
 
-def _velocity_rate(now: Motion, rate: Force, slip: Array | None) -> tuple[Array, Array]:
+def _velocity_rate(settings, now: Motion, rate: Force) -> tuple[Array, Array]:
     """Acceleration in x and y."""
     sine, cosine = sin_cos(now.theta)
     ahead, left = rate.along, now.w * now.v
-    if slip is not None:
-        ahead = ahead - now.w * lateral_slip(now.v, now.w, slip)
-        left = left + lateral_slip(rate.along, now.w, slip) + lateral_slip(now.v, rate.heading, slip)
+    for effect, values in acting("side", settings):
+        law = functools.partial(effect.act, **values)
+        speed, gained = jax.jvp(law, (now.v, now.w), (rate.along, rate.heading))
+        ahead, left = ahead - now.w * speed, left + gained
     return ahead * cosine - left * sine, ahead * sine + left * cosine
 
 
@@ -212,19 +201,8 @@ def _rubbed(settings, drive: Physical, start: Motion, pull: Force, d: Motion | N
         columns.append(wheel_speeds(drive, reached.v, reached.w))
     mobility = (columns[0].right, columns[1].right), (columns[0].left, columns[1].left)
 
-    def level(n: Wheels) -> Wheels:
-        return Wheels(*(_level(settings, side, m) for m, side in zip(n, Wheels._fields, strict=True)))
-
-    rubbed = force(drive, dry_friction(before, free, mobility, level))
+    rubbed = force(drive, dry_friction(before, free, mobility, functools.partial(friction_level, settings)))
     return Force(pull.along - scale * rubbed.along, pull.heading - scale * rubbed.heading)
-
-
-def _level(settings, side: str, n: Array) -> Array:
-    """The friction of a wheel that slides at speed n, over what is in the settings of both kinds."""
-    coulomb = settings["coulomb_friction"][side] if "coulomb_friction" in settings else 0.0
-    if "stiction" not in settings:
-        return coulomb + jnp.zeros_like(n)
-    return friction_level(n, coulomb, settings["stiction"][side], settings["stiction"]["fade"])
 
 
 def _linear(drive: Physical, v: Array, w: Array) -> tuple[Array, Array]:

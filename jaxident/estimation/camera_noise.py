@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from jaxident.effects.catalogue import BY_CHANCE, CATALOGUE
 from jaxident.log import Log
 from jaxident.robot.model import Model
 from jaxident.robot.noise import Noise
@@ -13,14 +14,14 @@ UNKNOWN = 1e-3, 5e-3
 
 
 def noise_for(model: Model, log: Log) -> Noise:
-    """The model's noise law with the memory that its `coloured_noise` adds; sized from the log where the model has
+    """The model's noise law with the memory that one of its effects adds; sized from the log where the model has
     none: camera error by fourth differences, no slip."""
     noise = model.noise
     if noise is None or not (float(noise.position) > 0.0 and float(noise.heading) > 0.0):
         noise = Noise(*camera_noise(log))
     for effect in model.effects:
-        if effect.name == "coloured_noise" and noise.correlation_time is None:
-            own = {"position": 0.0, "heading": 0.0, "correlation_time": 0.5} | effect.parameters
+        if effect.name == BY_CHANCE["memory"] and noise.correlation_time is None:
+            own = CATALOGUE[effect.name].neutral() | effect.parameters
             position, heading = (float(np.hypot(getattr(noise, key), own[key])) for key in ("position", "heading"))
             return noise._replace(
                 position=position, heading=heading, correlation_time=own["correlation_time"],

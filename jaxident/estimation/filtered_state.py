@@ -14,7 +14,7 @@ import jax.numpy as jnp
 from jaxident.array_types import Array, State, Wheels
 from jaxident.effects.coordinates import by_effect
 from jaxident.effects.fast_input import SUBSTEPS, expected_pushes
-from jaxident.effects.fast_motion import Row, advance_row, drive_of, lags_of, report
+from jaxident.effects.fast_motion import Row, advance_row, drive_of, lags_of, report, rolling
 from jaxident.numerics import wrap
 from jaxident.robot.drive import force
 from jaxident.robot.noise import Noise
@@ -59,7 +59,7 @@ class Run(NamedTuple):
 
 
 class _Belief(NamedTuple):
-    """Mean (states, n), the two parts of the covariance (states, states, n), and the excess speed of both wheels."""
+    """Mean (states, n), the two parts of the covariance (states, states, n), and the excess speeds of the wheels."""
 
     mean: Any
     start: Any
@@ -86,7 +86,7 @@ def filter_and_run(vector: Array, noise: Noise, lost: Array | None, stretch: Str
     size = 5 + 2 * (noise.slip_time is not None) + 3 * (noise.correlation_time is not None)
     none = jnp.zeros((size, t.shape[1]))
     nothing, wide = jnp.zeros((size, *none.shape)), _wide(noise)
-    begin = _Belief(none, nothing, nothing, [none[0]] * 2)
+    begin = _Belief(none, nothing, nothing, rolling(none[0]))
 
     def body(belief, now):
         k, row, own, pose, seen, jolt = now

@@ -8,6 +8,7 @@ import jax
 import numpy as np
 
 from jaxident.array_types import Array
+from jaxident.effects.catalogue import BY_CHANCE
 from jaxident.effects.coordinates import vector_of
 from jaxident.effects.fast_input import RUN_UP
 from jaxident.estimation.camera_noise import noise_for
@@ -58,9 +59,9 @@ def run_ahead(model: Model, log: Log, starts: Starts, horizon: int, *, burn_in: 
     step = float(np.median(np.concatenate([np.diff(run.t) for run in log.runs()])))
     first = int(np.ceil(RUN_UP / step)) + before
     chance = {effect.name: effect.parameters for effect in model.effects}
-    if "frozen_frames" in chance:
+    if BY_CHANCE["repeat"] in chance:
         log = blind(log, repeats(log))
-    lost = chance["lost_commands"]["probability"] if "lost_commands" in chance else None
+    lost = chance[BY_CHANCE["lost"]]["probability"] if BY_CHANCE["lost"] in chance else None
     filler = -(first + 1 + horizon) % ROWS
     stretch = cut_stretches(log, starts, first - before, before, horizon + filler, session_time)
     ahead = slice(first + 1, first + 1 + horizon)

@@ -4,42 +4,12 @@ from collections.abc import Iterable, Mapping
 from math import floor, isfinite, log10
 
 from jaxident.effects.catalogue import CATALOGUE
-from jaxident.effects.entry import UNIT, Parameter
+from jaxident.effects.effect import UNIT, Parameter
 from jaxident.report.page import NOTHING
 
 SPACE = "\N{NO-BREAK SPACE}"
 
-EFFECTS = {
-    "asymmetric_dead_zone": "a wheel's dead zone is wider in one direction than in the other",
-    "direction_gain": "a wheel turns faster in one direction than in the other",
-    "input_saturation": "commands beyond a level have no further effect",
-    "input_quantisation": "commands act in steps",
-    "input_rate_limit": "commands can change only so fast",
-    "transport_delay": "commands act late, or the camera reports late",
-    "motor_lag": "the motors take time to follow",
-    "backlash": "play in the gears, crossed whenever the push turns round",
-    "supply_sag": "the supply gives way when both motors draw",
-    "lost_commands": "some commands never arrive",
-    "coulomb_friction": "dry friction, the same at any speed",
-    "stiction": "it takes more to leave rest than to keep moving",
-    "quadratic_drag": "drag that grows with the square of the speed",
-    "mass_offset": "the centre of mass lies off the axle",
-    "turn_loss": "speed is lost while turning",
-    "traction_limit": "the wheels push no harder than their grip on the floor, or the motors' current, allows",
-    "lateral_slip": "the robot drifts outwards in curves",
-    "slope": "the floor is not level",
-    "gain_drift": "the drive grows weaker or stronger with time, as when a battery runs down",
-    "dead_zone_drift": "the dead zones change with time, as by wear",
-    "payload_change": "the load changed at some instant",
-    "marker_offset": "the tracked marker is not on the axle's centre",
-    "heading_offset": "the reported heading is off by a constant",
-    "camera_scale": "the camera scales x and y differently",
-    "lens_distortion": "the camera's lens bends the picture",
-    "coloured_noise": "the camera's errors persist from frame to frame",
-    "outliers": "single poses are far off",
-    "frozen_frames": "the camera repeats old poses",
-    "camera_tilt": "the camera looks at the floor aslant",
-}
+EFFECTS = {name: record.words for name, record in CATALOGUE.items()}
 """Each effect of the catalogue in plain words."""
 
 SITES = {

@@ -30,6 +30,8 @@ CANONICAL = {
         ("transport_delay", {"delay": -0.1}, "delay is -0.1; at least 0 s"),
         ("transport_delay", {"delay": 99.0}, "delay is 99 s, longer than the log of 6.66667 s"),
         ("transport_delay", {"delay": math.nan}, "delay is nan"),
+        ("command_polling", {"period": 99.0}, "'command_polling': period is 99 s, longer than the log of 6.66667 s"),
+        ("twist_quantisation", {"mean": -0.1}, "mean is -0.1; at least 0 unit"),
         ("motor_lag", {"time_constant": math.inf}, "time_constant is inf"),
         ("input_saturation", {"level": 0.0}, "level is 0; above 0 unit; 0.3 to 1 unit on real robots"),
         ("input_quantisation", {"step": -1.0}, "step is -1"),

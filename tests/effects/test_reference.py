@@ -18,6 +18,7 @@ SETS = [(name,) for name in CERTAIN] + [
     ("transport_delay", "motor_lag", "coulomb_friction"),
     ("asymmetric_dead_zone", "input_rate_limit", "quadratic_drag", "lateral_slip", "marker_offset"),
     ("payload_change", "stiction", "gain_drift"),
+    ("twist_quantisation", "transport_delay", "command_polling", "payload_change", "motor_lag"),
 ]
 
 
@@ -73,7 +74,10 @@ def test_a_program_of_these_effects_alone_does_the_same(names):
     assert np.abs(found - reference(names, log)).max() < tolerance(names)
 
 
-@pytest.mark.parametrize("names", [("transport_delay",), ("payload_change",), ("motor_lag", "slope")], ids="+".join)
+UNEVEN = [("transport_delay",), ("payload_change",), ("motor_lag", "slope"), ("command_polling", "transport_delay")]
+
+
+@pytest.mark.parametrize("names", UNEVEN, ids="+".join)
 def test_uneven_steps(names):
     log = drive_log(even=False)
     found = poses(ji.simulate(typical(*names), log, start=START, session_time=1.0))

@@ -23,7 +23,7 @@ def simulate_reference(parameters, effects, t, u_r, u_l, start, *, session_time=
     robot = Robot(parameters, effects, session_time - t[0])
     u = sent_commands(effects, np.array([u_r, u_l], float).T, rng)
     delay = effects.get("transport_delay", {}).get("delay", 0.0)
-    arrivals = np.asarray(t, float) + delay
+    arrivals = polled(effects, np.asarray(t, float) + delay, session_time - t[0])
     change = effects.get("payload_change", {}).get("instant", 0.0) - session_time + t[0]
     stops = np.unique(np.concatenate([t, arrivals, [change]]))
     stops = stops[(stops >= t[0]) & (stops <= t[-1])]
@@ -263,10 +263,32 @@ class Robot:
         return new
 
 
+def polled(effects, arrivals, offset):
+    """Times at which commands act that arrive at a base which reads them now and then; `offset` makes session times."""
+    polling = effects.get("command_polling", {"period": 0.0})
+    if polling["period"] == 0.0:
+        return arrivals
+    found = []
+    for arrival in arrivals + offset:
+        poll = (math.floor(arrival / polling["period"]) - 2.0 + polling["phase"]) * polling["period"]
+        while poll < arrival - 1e-9:
+            poll += polling["period"]
+        found.append(poll - offset)
+    return np.array(found)
+
+
 def sent_commands(effects, u, rng):
     """Commands (samples, 2) that leave for the robot."""
     level = effects.get("input_saturation", {}).get("level", math.inf)
     u = np.minimum(np.maximum(u, -level), level)
+    for row, (right, left) in enumerate(u if "twist_quantisation" in effects else []):
+        steps = effects["twist_quantisation"]
+        mean, difference = (right + left) / 2.0, right - left
+        if steps["mean"] > 0.0:
+            mean = np.round(mean / steps["mean"]) * steps["mean"]
+        if steps["difference"] > 0.0:
+            difference = np.round(difference / steps["difference"]) * steps["difference"]
+        u[row] = mean + difference / 2.0, mean - difference / 2.0
     step = effects.get("input_quantisation", {}).get("step", 0.0)
     if step > 0.0:
         u = np.round(u / step) * step

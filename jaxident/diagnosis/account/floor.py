@@ -18,6 +18,7 @@ from jaxident.diagnosis.noise.doubt import Draws
 from jaxident.diagnosis.noise.law import Law, deviations
 from jaxident.diagnosis.prepare import Prepared
 from jaxident.diagnosis.translate import noise_of
+from jaxident.effects.catalogue import BY_CHANCE, CATALOGUE
 from jaxident.log import run_begins
 from jaxident.robot.model import Model
 
@@ -25,7 +26,9 @@ LARGER = 0.01
 """Part by which the camera's variances are scaled to see what depends on them."""
 RARE = 0.1
 """Share of all draws below which a memory of slip is not followed by itself."""
-MEMORY = "coloured_noise"
+MEMORY = BY_CHANCE["memory"]
+SQUARES = {name: each.chance.squares for name, each in CATALOGUE.items() if each.chance and each.chance.squares}
+"""Expected squares that effects of chance leave on single frames."""
 LATE = 4
 """Frames in a row that may be repeats of one before: five are too rare to matter."""
 
@@ -129,16 +132,11 @@ def _variances(model: Model, prepared: Prepared, law: Law, scale: float = 1.0) -
 
 def _in_the_camera(named: dict, judged: Judged, prepared: Prepared) -> dict[str, np.ndarray]:
     """Expected squares (starts, 3) of effects of chance that act on single frames."""
-    found = {}
-    if "outliers" in named:
-        law = named["outliers"]
-        sizes = np.array([law["position"], law["position"], law["heading"]])
-        found["outliers"] = np.broadcast_to(law["probability"] * sizes**2, judged.error.shape)
-    if "frozen_frames" in named:
-        p, path = named["frozen_frames"]["probability"], judged.path
-        starts = prepared.judging
-        heading = np.asarray(prepared.log.theta)[run_begins(prepared.log)[starts.run] + starts.row + prepared.rows]
-        late = [(path[:, -1] - path[:, max(-1 - k, -path.shape[1])]) for k in range(1, LATE + 1)]
-        turned = [(into_channels(heading) @ part[..., None])[..., 0] for part in late]
-        found["frozen_frames"] = sum((1.0 - p) * p**k * part**2 for k, part in enumerate(turned, start=1))
-    return found
+    own = {name: values for name, values in named.items() if name in SQUARES}
+    if not own:
+        return {}
+    path, starts = judged.path, prepared.judging
+    heading = np.asarray(prepared.log.theta)[run_begins(prepared.log)[starts.run] + starts.row + prepared.rows]
+    late = [(path[:, -1] - path[:, max(-1 - k, -path.shape[1])]) for k in range(1, LATE + 1)]
+    turned = [(into_channels(heading) @ part[..., None])[..., 0] for part in late]
+    return {name: np.asarray(SQUARES[name](turned, **values)) for name, values in own.items()}

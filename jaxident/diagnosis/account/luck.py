@@ -5,6 +5,7 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.diagnosis.account.judging import Judged
 from jaxident.diagnosis.prepare import Prepared
+from jaxident.effects.catalogue import BY_CHANCE
 from jaxident.log import run_begins
 
 
@@ -39,7 +40,7 @@ def _rate(name: str, parameters: dict, prepared: Prepared) -> tuple[np.ndarray, 
     if "probability" not in parameters:
         return np.ones(len(starts.row)), np.inf
     p, poses = parameters["probability"], prepared.frames.poses
-    if name != "lost_commands":
+    if name != BY_CHANCE["lost"]:
         return np.full(len(starts.row), p), p * poses
     command = np.stack(prepared.log.command, axis=1)
     changed = np.append(np.any(command[1:] != command[:-1], axis=1), False)

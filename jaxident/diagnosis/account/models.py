@@ -12,10 +12,11 @@ from jaxident.diagnosis.causes.search import Data, refit
 from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.prepare import Prepared
 from jaxident.diagnosis.translate import to_model
+from jaxident.effects.catalogue import BY_CHANCE
 from jaxident.effects.coordinates import COORDINATES, NOMINAL, PLACES, neutral_vector
 from jaxident.robot.model import Model
 
-LOST = "lost_commands"
+LOST = BY_CHANCE["lost"]
 """Chance that bends the mean path, too: a change of command comes later on average."""
 
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 from jaxident.diagnosis.causes.search import Data, Solution
 from jaxident.diagnosis.noise.law import Law
 from jaxident.effects.catalogue import CATALOGUE
-from jaxident.effects.coordinates import COORDINATES
+from jaxident.effects.coordinates import COORDINATES, SEARCHED
 
 PENALTY = 4.0
 """Fall of -log p that each coordinate of an effect costs."""
@@ -17,7 +17,7 @@ FORM, ELSEWHERE = 0.01, 0.001
 """Part of all that is explained which a further effect must bring at a site where the set has one already, and at
 another: a robot's own form of an effect is never quite that of the catalogue, and what it leaves looks like another one
 of the same site."""
-RIGID = ("marker_offset", "heading_offset")
+RIGID = {name for name, search in SEARCHED.items() if search.rigid}
 """Effects that geometry gives one form: what they leave is not the form of theirs, so that beside them a further effect
 pays as at another site, and so do they beside others."""
 

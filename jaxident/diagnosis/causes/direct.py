@@ -8,6 +8,7 @@ from jaxident.diagnosis.frames import has_outliers
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.noise.sizing import steady_gain
 from jaxident.diagnosis.prepare import Prepared
+from jaxident.effects.catalogue import BY_CHANCE
 
 
 def direct_evidence(prepared: Prepared, finding: Finding, price: float = ENOUGH) -> dict[str, float]:
@@ -15,11 +16,11 @@ def direct_evidence(prepared: Prepared, finding: Finding, price: float = ENOUGH)
     what commands that never arrived and a memory must be worth, for they too take up what is missing in a model."""
     frozen, outlying = int(prepared.frames.frozen.sum()), prepared.frames.outlying
     return {
-        "frozen_frames": 10.0 * frozen if frozen >= 3 else 0.0,
+        BY_CHANCE["repeat"]: 10.0 * frozen if frozen >= 3 else 0.0,
         # normal noise lies OUTLYING deviations off once in 10^11 rows
-        "outliers": 10.0 * int(outlying.sum()) if has_outliers(outlying, prepared.frames.poses) else 0.0,
-        "lost_commands": prepared.lost[1] - (price - ENOUGH),
-        "coloured_noise": _memory(finding, price) if finding.law.coloured is not None else 0.0,
+        BY_CHANCE["outlier"]: 10.0 * int(outlying.sum()) if has_outliers(outlying, prepared.frames.poses) else 0.0,
+        BY_CHANCE["lost"]: prepared.lost[1] - (price - ENOUGH),
+        BY_CHANCE["memory"]: _memory(finding, price) if finding.law.coloured is not None else 0.0,
     }
 
 
@@ -41,16 +42,16 @@ def direct_effects(prepared: Prepared, finding: Finding, selected) -> dict[str, 
     """Parameters of the selected effects among these."""
     frames, poses = prepared.frames, max(prepared.frames.poses, 1)
     found: dict[str, dict[str, float]] = {}
-    if "frozen_frames" in selected:
-        found["frozen_frames"] = {"probability": float(frames.frozen.sum() / poses)}
-    if "outliers" in selected:
+    if BY_CHANCE["repeat"] in selected:
+        found[BY_CHANCE["repeat"]] = {"probability": float(frames.frozen.sum() / poses)}
+    if BY_CHANCE["outlier"] in selected:
         position, heading = frames.sizes
         share = float(frames.outlying.sum() / poses)
-        found["outliers"] = {"probability": share, "position": position, "heading": heading}
-    if "lost_commands" in selected:
-        found["lost_commands"] = {"probability": prepared.lost[0]}
-    if "coloured_noise" in selected and finding.law.coloured is not None:
+        found[BY_CHANCE["outlier"]] = {"probability": share, "position": position, "heading": heading}
+    if BY_CHANCE["lost"] in selected:
+        found[BY_CHANCE["lost"]] = {"probability": prepared.lost[0]}
+    if BY_CHANCE["memory"] in selected and finding.law.coloured is not None:
         position, heading = finding.law.coloured
         time = float(finding.law.coloured_time or 0.0)
-        found["coloured_noise"] = {"position": position, "heading": heading, "correlation_time": time}
+        found[BY_CHANCE["memory"]] = {"position": position, "heading": heading, "correlation_time": time}
     return found

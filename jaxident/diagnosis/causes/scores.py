@@ -1,7 +1,5 @@
 """Scores of all effects from one fit, without refitting: which are worth a refit, and which this input could show."""
 
-from collections.abc import Iterable
-
 import numpy as np
 
 from jaxident.array_types import Array
@@ -10,53 +8,30 @@ from jaxident.diagnosis.causes.steps import likely_steps
 from jaxident.diagnosis.motion.linear import explained, follow, gram, left_over, linearise, normal
 from jaxident.effects.coordinates import (
     COORDINATES,
+    FORMED,
     PLACES,
+    REACHED,
+    SEARCHED,
     SILENT,
     SMOOTH,
     STEPPED,
     limits,
+    seeds,
 )
+from jaxident.effects.effect import Seed
 
-STEPS = np.geomspace(0.02, 0.4, 96)
-"""Steps of a quantised command where nothing suggests better ones, in largest commands."""
-FORMED = ("backlash", "traction_limit")
-"""Effects with a derivative at neutral that says nothing of another form of theirs."""
-LENS, CENTRES = 0.01, 6
-"""Strength [1/m^2] of a lens, and places along each axis of the field where its centre is looked for."""
-INSTANTS = (10.0, 1.2, 0.15)
-"""Reach [s] of each search for an instant about the best before."""
-STEP_PARTS = (2e-3, 2e-4)
-"""Reach, as a part of it, of each search for a step: of a thousand levels some lie within a thousandth of a jump."""
-INSTANT, STEP = ("payload_change", "instant"), ("input_quantisation", "step")
+CENTRES = 6
+"""Places along each axis of the field where the centre of an effect of the optics is looked for."""
 
 
-def seeds(name: str, duration: float, steps: Iterable[float] = STEPS) -> list[dict[str, float]]:
-    """Points from which an effect without a derivative at neutral is looked for; one neutral point for the others.
-    duration [s] of all runs; steps of a quantised command."""
-    if name == "input_saturation":
-        return [{"level": level} for level in (0.9, 0.75, 0.6, 0.45, 0.3)]
-    if name == "input_quantisation":
-        return [{"step": float(step)} for step in steps]
-    if name == "input_rate_limit":
-        return [{"inverse_rate": inverse} for inverse in (0.03, 0.07, 0.15, 0.3, 0.6)]
-    if name == "stiction":
-        return [{"right": s, "left": s, "fade": fade} for s, fade in ((0.05, 0.05), (0.15, 0.05), (0.1, 0.15))]
-    if name == "payload_change":
-        return [{"loss": 0.1, "instant": duration * part} for part in np.linspace(0.06, 0.94, 12)]
-    if name == "backlash":
-        return [{}, {"right": 0.02, "left": 0.02, "coasting": 1.0}]
-    if name == "traction_limit":
-        return [{}, {"inverse_square": 2.0, "dry": 1.0, "spin": 0.02}]
-    return [{}]
-
-
-def _own_seeds(name: str, data: Data, solution: Solution) -> list[dict[str, float]]:
-    """Seeds for a solution's data; steps of a quantised command are those that its residuals suggest, centres of a lens
-    lie all over the field."""
-    if name == "lens_distortion":
-        return [{"strength": LENS, "pull_x": LENS * x, "pull_y": LENS * y} for x, y in _centres(data)]
-    steps = likely_steps(data, solution) if name == "input_quantisation" else STEPS
-    return seeds(name, float(data.windows.session[-1] + data.windows.t[-1, -1]), steps)
+def _own_seeds(name: str, data: Data, solution: Solution) -> list[Seed]:
+    """Seeds for a solution's data; where a record says so, those that the poses or the residuals suggest."""
+    suggested = SEARCHED[name].suggested
+    if suggested is None:
+        return seeds(name, float(data.windows.session[-1] + data.windows.t[-1, -1]))
+    if suggested.by == "places":
+        return [suggested.seed(*place) for place in _centres(data)]
+    return [suggested.seed(step) for step in likely_steps(data, solution)]
 
 
 def _centres(data: Data) -> list[tuple[float, float]]:
@@ -157,7 +132,8 @@ def at_best(data: Data, solution: Solution, pair: tuple[str, str]) -> np.ndarray
     linearly: -log p has a valley in every window, or jumps wherever a command rounds to another tooth."""
     place, base = PLACES[pair], len(solution.places)
     best = np.array(solution.vector)
-    for span in INSTANTS if pair == INSTANT else best[place] * np.array(STEP_PARTS):
+    reach = np.array(REACHED[pair].reach)
+    for span in best[place] * reach if REACHED[pair].relative else reach:
         vectors = np.tile(best, (17, 1))
         vectors[:, place] += span * np.linspace(-1.0, 1.0, len(vectors))
         lanes = np.broadcast_to(solution.starts, (len(vectors), *solution.starts.shape))

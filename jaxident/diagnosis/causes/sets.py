@@ -4,11 +4,12 @@ from collections.abc import Collection
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.candidates import ENOUGH, PENALTY, Candidate, Finding, value
-from jaxident.diagnosis.causes.scores import INSTANT, STEP, at_best, beginnings, score
+from jaxident.diagnosis.causes.scores import at_best, beginnings, score
 from jaxident.diagnosis.causes.search import Data, Solution, refit
 from jaxident.effects.coordinates import (
     COORDINATES,
     NOMINAL,
+    REACHED,
     SHAPES,
     STEPPED,
     free_places,
@@ -35,7 +36,7 @@ def refit_each(found: dict, data: Data, begin: Solution, names: list[str], besid
 def _refit_with_shapes(data: Data, vector: Array, starts: Array, effects: tuple[str, ...]) -> Solution:
     """A refit that first finds the size of the last effect: what only shapes it is lost until then."""
     shapes = tuple(pair for pair in SHAPES - STEPPED if pair[0] == effects[-1])
-    searched = next((pair for pair in (INSTANT, STEP) if pair[0] == effects[-1]), None)
+    searched = next((pair for pair in REACHED if pair[0] == effects[-1]), None)
     if shapes or searched:
         first = refit(data, vector, starts, effects, shapes, most=4)
         vector, starts = first.vector, first.starts

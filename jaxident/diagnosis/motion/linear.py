@@ -15,7 +15,7 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.motion.paths import push_of, residuals
 from jaxident.diagnosis.motion.responses import answer_to_start
 from jaxident.diagnosis.motion.windows import Windows
-from jaxident.effects.coordinates import NOMINAL, PLACES, limits, sizes
+from jaxident.effects.coordinates import BY_DRIVE, NOMINAL, PLACES, limits, sizes
 from jaxident.effects.fast_input import PUSHING
 
 START_STATES = 5
@@ -43,6 +43,7 @@ class Gram(NamedTuple):
 
 
 _pushed, _moved = jax.jit(push_of), jax.jit(residuals)
+_BY_DRIVE = [PLACES[pair] for pair in sorted(BY_DRIVE)]
 _PUSHING = [6, 7, *(place for (name, _), place in PLACES.items() if name in PUSHING)]
 
 
@@ -55,7 +56,7 @@ def follow(vectors: Array, starts: Array, windows: Windows) -> np.ndarray:
     """
     windows = jax.tree.map(jnp.asarray, windows)
     driven = vectors[:, _PUSHING]
-    if np.any(vectors[:, PLACES["backlash", "coasting"]] > 0.0):
+    if np.any(vectors[:, _BY_DRIVE] > 0.0):
         driven = np.concatenate([driven, vectors[:, : len(NOMINAL)]], axis=1)
     _, first, own = np.unique(driven, axis=0, return_index=True, return_inverse=True)
     push = [_pushed(vectors[k], windows) for k in first]

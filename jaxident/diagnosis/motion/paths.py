@@ -7,7 +7,7 @@ from jaxident.array_types import Array, Pose, State
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.coordinates import by_effect
 from jaxident.effects.fast_input import SUBSTEPS, Push, pushes
-from jaxident.effects.fast_motion import Row, advance_row, drive_of, lags_of, report
+from jaxident.effects.fast_motion import Row, advance_row, drive_of, lags_of, report, rolling
 from jaxident.numerics import wrap
 
 
@@ -47,6 +47,5 @@ def move(vector: Array, starts: Array, push: Push, windows: Windows) -> State:
         state, excess = carry
         return advance_row(settings, drive, state, excess, row), state
 
-    rolling = [jnp.zeros_like(starts[0])] * 2
     rows = Row(push.mean, push.slope, part, lags_of(drive, part), begin)
-    return jax.lax.scan(body, (State(*starts), rolling), rows)[1]
+    return jax.lax.scan(body, (State(*starts), rolling(starts[0])), rows)[1]

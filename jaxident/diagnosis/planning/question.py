@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.scores import seeded, seeds
+from jaxident.diagnosis.causes.scores import seeded
 from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.prepare import BURN, horizon_rows
 from jaxident.diagnosis.translate import scaled
@@ -18,6 +18,7 @@ from jaxident.effects.coordinates import (
     from_catalogue,
     neutral_vector,
     nominal_vector,
+    seeds,
     unit_factors,
 )
 from jaxident.errors import InputError
@@ -90,9 +91,8 @@ def expected_size(model: Model, name: str, limit: float, samples: int) -> dict[s
     for effect in model.effects:
         if effect.name == name:
             return {key: float(value) for key, value in effect.parameters.items()}
-    typical, factors = CATALOGUE[name].typical(), unit_factors(name, limit)
-    if name == "payload_change":
-        typical["instant"] = 0.5 * samples * float(model.sample_period)
+    duration, factors = samples * float(model.sample_period), unit_factors(name, limit)
+    typical = CATALOGUE[name].typical(duration)
     return {key: float(value) * factors[key] for key, value in typical.items()}
 
 

@@ -1,0 +1,113 @@
+"""Laws that remember the push: play in the gears, and the lag of the motors.
+
+Each stands here three times: for one wheel and a held push, as the stage `gear` has it for one substep, and for whole
+runs at once, which the fast integrator runs. The tests hold the last against a scan of the second.
+"""
+
+import jax
+import jax.numpy as jnp
+
+from jaxident.array_types import Array, Wheels
+from jaxident.effects.signals import Push, Substep
+from jaxident.numerics import hold_integrals, safe_divide
+from jaxident.robot.drive import Physical, force, wheel_speeds
+
+
+def backlash(position: Array, turning: Array, step: Array, width: Array) -> tuple[Array, Array]:
+    """New position in the play and the part of the step [0, 1] that passed before the gear drives again.
+
+    position in [-width / 2, width / 2] moves with p' = turning = m - c n while the wheel is free; the motor drives
+    where p touches the side towards which it turns. c = 0: the wheel brakes meanwhile, as if on the motor's side, and
+    only a reversal of m opens the play. c = 1: the play lies between motor and wheel, n is the wheel's speed, and the
+    free wheel coasts, pushed by c n. width in unit s: play in distance over the speed per unit of command.
+    """
+    half = 0.5 * width
+    remaining = jnp.maximum(half - jnp.sign(turning) * position, 0.0)
+    free = jnp.clip(safe_divide(remaining, jnp.abs(turning) * step, 0.0), 0.0, 1.0)
+    loose = width > 0.0  # without play the bounds meet, and the derivative of a clip between them is arbitrary
+    return jnp.where(loose, jnp.clip(position + turning * step, -half, half), 0.0), jnp.where(loose, free, 0.0)
+
+
+def play(push: Push, memory: Wheels, now: Substep, right: Array, left: Array, coasting: Array) -> tuple[Push, Wheels]:
+    """What passes the play of both wheels; memory: the positions in it. The wheels' speeds are asked for twice: under
+    the push without play, then under what passes."""
+    speeds = now.speeds(push.mean)
+    passed, _ = _play(push, memory, now.step, Wheels(right, left), coasting, speeds)
+    return _play(push, memory, now.step, Wheels(right, left), coasting, now.speeds(passed.mean))
+
+
+def _play(push: Push, memory: Wheels, step: Array, width: Wheels, coasting: Array, n: Wheels) -> tuple[Push, Wheels]:
+    """With the wheels at speeds n: for a first part of the substep no more passes than what lets a wheel coast."""
+    means, slopes, positions = [], [], []
+    for wheel in range(2):
+        coasts = coasting * n[wheel]
+        turning = push.mean[wheel] - coasts
+        position, free = backlash(memory[wheel], turning, step, width[wheel])
+        driving = 1.0 - free
+        slope = 6.0 * free * driving * turning
+        means.append(coasts + driving * turning)
+        slopes.append(slope if push.slope is None else slope + driving * push.slope[wheel])
+        positions.append(position)
+    return Push(Wheels(*means), Wheels(*slopes)), Wheels(*positions)
+
+
+def play_of_runs(push: Push, drive: Physical, step: Array, right: Array, left: Array, coasting: Array) -> Push:
+    """`play` over whole runs (points, runs, 2), steps (points, runs, 1) [s]; the speeds of wheels that coast are those
+    of the nominal drive at the start of each substep."""
+    width, decay = jnp.stack([jnp.asarray(right), jnp.asarray(left)]), jnp.exp(-drive.rate * step)
+
+    def body(carry, now):
+        position, speeds = carry
+        mean, own, decay = now
+        across = speeds[:, ::-1] * drive.coupling
+        coasts = coasting * jnp.stack(wheel_speeds(drive, *speeds.T), axis=-1)
+        position, free = backlash(position, mean - coasts, own, width)
+        pull = force(drive, Wheels(*(free * coasts + (1.0 - free) * mean).T))
+        steady = (jnp.stack(pull, axis=-1) + across) / drive.rate
+        return (position, steady + (speeds - steady) * decay), (free, coasts)
+
+    still = jnp.zeros_like(push.mean[0])
+    free, coasts = jax.lax.scan(body, (still, still), (push.mean, step, decay))[1]
+    driving, turning = 1.0 - free, push.mean - coasts
+    return Push(coasts + driving * turning, driving * push.slope + 6.0 * free * driving * turning)
+
+
+def motor_lag(last: Array, m: Array, step: Array, time_constant: Array) -> tuple[Array, Array, Array, Array]:
+    """q' = (m - q) / tau over a step of held m: q at its end, mean of q, its slope (12 times the first moment about
+    the middle, so that mean + slope (s - 1/2) has both moments of q), and the part of q that kept its start."""
+    lagging = time_constant > 0.0
+    decay, once, twice = hold_integrals(1.0 / jnp.where(lagging, time_constant, 1.0), step)
+    kept = safe_divide(once, step, 1.0)
+    moment = safe_divide(step * once - twice, step * step, 0.5) - 0.5 * kept
+    first = safe_divide(time_constant, step, 0.0)  # the limit of `kept`, which gives the derivative at no lag
+    still = jnp.where(step > 0.0, 0.0, 1.0)  # no time, no change: else a step of length zero would hide a switch
+    limits = (decay, still), (kept, first), (moment, -0.5 * first)
+    decay, kept, moment = (jnp.where(lagging, value, limit) for value, limit in limits)
+    gap = last - m
+    return m + gap * decay, m + gap * kept, 12.0 * moment * gap, kept
+
+
+def lag(push: Push, memory: Wheels, now: Substep, time_constant: Array) -> tuple[Push, Wheels]:
+    """What passes the lag of both motors; memory: what passed at last. The slope of its input passes as far as the lag
+    follows within the substep."""
+    means, slopes, ends = [], [], []
+    for wheel in range(2):
+        end, mean, slope, kept = motor_lag(memory[wheel], push.mean[wheel], now.step, time_constant)
+        means.append(mean)
+        slopes.append(slope if push.slope is None else slope + (1.0 - kept) * push.slope[wheel])
+        ends.append(jnp.asarray(end))
+    return Push(Wheels(*means), Wheels(*slopes)), Wheels(*ends)
+
+
+def lag_of_runs(push: Push, _: Physical, step: Array, time_constant: Array) -> Push:
+    """`lag` over whole runs (points, runs, 2), steps (points, runs, 1) [s]; it is linear, so that the response to a
+    unit gap serves every substep."""
+    decay, average, rising, kept = motor_lag(jnp.ones_like(step), jnp.zeros_like(step), step, time_constant)
+
+    def body(last, now):
+        goal, own = now
+        return goal + (last - goal) * own, last
+
+    last = jax.lax.scan(body, jnp.zeros_like(push.mean[0]), (push.mean, decay))[1]
+    gap = last - push.mean
+    return Push(push.mean + gap * average, gap * rising + (1.0 - kept) * push.slope)
