@@ -14,9 +14,9 @@ import pathlib
 import jaxident as ji
 from jaxident.diagnosis.account.measure import measure
 from jaxident.diagnosis.causes.direct import direct_effects, direct_evidence, present
+from jaxident.diagnosis.causes.finding import find_effects
 from jaxident.diagnosis.diagnose import decide
 from jaxident.diagnosis.prepare import prepare
-from jaxident.diagnosis.repair import search
 from jaxident.diagnosis.verdict import judge
 from jaxident.effects import CATALOGUE
 from jaxident.effects.coordinates import COORDINATES
@@ -48,7 +48,7 @@ def main() -> None:
 def without(case: pathlib.Path, effect: str) -> dict:
     """Verdict, what was named, and whether the most probable site is that of the effect that was left out."""
     logs = [ji.read_log(path) for path in sorted(case.glob("real_*"))]
-    prepared, finding = search(prepare(logs, None), without=(effect,))
+    prepared, finding = find_effects(prepare(logs, None), without=(effect,))
     extra = direct_evidence(prepared, finding)
     shown = present(finding, extra)
     gap = measure(prepared, finding, None, (), direct_effects(prepared, finding, shown)).gap

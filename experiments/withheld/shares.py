@@ -17,9 +17,9 @@ import pathlib
 import numpy as np
 
 import jaxident as ji
-from jaxident.diagnosis.account.account import shapley
 from jaxident.diagnosis.account.judging import judge_model
-from jaxident.diagnosis.causes.search import Data, refit
+from jaxident.diagnosis.account.shapley import shapley
+from jaxident.diagnosis.causes.refit import Data, refit
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.noise.law import Law, whitener_of
 from jaxident.diagnosis.prepare import Prepared, prepare

@@ -10,10 +10,9 @@ from jaxident.diagnosis.account.measure import Gap, measure
 from jaxident.diagnosis.account.models import as_model
 from jaxident.diagnosis.account.shrink import Shrink
 from jaxident.diagnosis.account.where import Place
-from jaxident.diagnosis.causes.candidates import ENOUGH, Finding
 from jaxident.diagnosis.causes.direct import direct_effects, direct_evidence, present
+from jaxident.diagnosis.causes.finding import CLAIMED, Finding, find_effects
 from jaxident.diagnosis.prepare import Prepared, prepare
-from jaxident.diagnosis.repair import search
 from jaxident.diagnosis.replay import Replay, answers, replay, visible
 from jaxident.diagnosis.simulator import Simulator, as_simulator, check_units, inspect_simulator, shared
 from jaxident.diagnosis.translate import to_model
@@ -42,7 +41,7 @@ class Parameter(NamedTuple):
 class Diagnosis(NamedTuple):
     """What `diagnose` found. verdict: "no_gap", "parameters", "effects", "partly", "unknown" or "undecided". selected:
     the named effects, in the order in which they were accepted. visible: the gain that each effect of typical size
-    would have had; below ENOUGH this input could not have shown it. replay: what faint effects come out as. surplus:
+    would have had; below CLAIMED this input could not have shown it. replay: what faint effects come out as. surplus:
     effects that the user's simulator has and the robot has not."""
 
     verdict: str
@@ -66,7 +65,7 @@ class Diagnosis(NamedTuple):
     @property
     def not_testable(self) -> list[str]:
         """Effects that this input could not have shown at their typical size, and that are not among the named."""
-        return [name for name, gain in self.visible.items() if gain < ENOUGH and name not in self.selected]
+        return [name for name, gain in self.visible.items() if gain < CLAIMED and name not in self.selected]
 
 
 def diagnose(
@@ -87,18 +86,17 @@ def diagnose(
     require_float64("diagnose")
     check_nominal(logs, sim, model)
     simulator = None if model is None else as_simulator(model, logs)
-    prepared, finding = search(prepare(logs, horizon, None if simulator is None else simulator.vector[:10]))
-    values = None
+    prepared, finding = find_effects(prepare(logs, horizon, None if simulator is None else simulator.vector[:10]))
     if sim is not None:
-        simulator, finding, values = inspect_simulator(sim, prepared, finding)
+        simulator, finding = inspect_simulator(sim, prepared, finding)
     told = None if simulator is None else simulator.vector
-    extra = direct_evidence(prepared, finding, ENOUGH if simulator is None else simulator.price)
+    extra = direct_evidence(prepared, finding, CLAIMED if simulator is None else simulator.price)
     shown = present(finding, extra)
     common, surplus = shared(shown, simulator)
     direct = direct_effects(prepared, finding, shown)
     given = None if simulator is None else as_model(prepared, simulator.vector, finding.law, simulator.effects, direct)
     gap, account, where, shrinks, corrected = measure(prepared, finding, given, common, direct, seed)
-    judgement = judge(finding, gap, extra, simulator, values)
+    judgement = judge(finding, gap, extra, simulator)
     selected = tuple(name for name in shown if name not in common) if judgement.none < 0.5 else ()
     known = answers(finding.data, finding.nominal, prepared.largest)
     parameters = compare_parameters(prepared, finding, told, common)
@@ -121,7 +119,7 @@ def compare_parameters(prepared: Prepared, finding: Finding, given, common: tupl
     """Nominal parameters given (coordinates, None where none were) and refitted, in the user's units; then those of the
     effects that the given model has in common with the robot: the right effect may have the wrong size. A limit that
     never acts has none."""
-    best = finding.candidates[finding.selected].solution
+    best = finding.fit
     if given is not None and ASIDE[0] in common and PLACES[ASIDE] not in best.places:
         given = translate.abreast_of_marker(given)  # as the refit has it, which is not told its side
     names, values, deviations = translate.parameters_of(best, prepared.largest)

@@ -6,7 +6,7 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.lost import Lost
-from jaxident.diagnosis.causes.search import Solution
+from jaxident.diagnosis.causes.refit import Solution
 from jaxident.diagnosis.frames import (
     Frames,
     find_more_outliers,
@@ -15,11 +15,9 @@ from jaxident.diagnosis.frames import (
     frames_of,
     has_outliers,
 )
-from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.motion.windows import Piece, Windows, cut, take
-from jaxident.diagnosis.noise.law import Law, first_law
-from jaxident.diagnosis.noise.sizing import size_noise
-from jaxident.diagnosis.nominal import better_valley, rough_fit, starting_point
+from jaxident.diagnosis.noise.law import Law
+from jaxident.diagnosis.nominal import lower_valley, rough_fit, starting_point
 from jaxident.diagnosis.roles import split
 from jaxident.effects.coordinates import neutral_vector
 from jaxident.errors import InputError
@@ -45,7 +43,7 @@ class Prepared(NamedTuple):
     windows: those that fit and name, commands over `largest`; frames: of the rows that they were cut from. judging:
     rows from which predictions are judged, `rows` rows or horizon [s] ahead, none of which the windows saw beyond;
     naming: the same of the rows that fit, in the log `fitted` of these alone.
-    nominal, law: the nominal fit and the noise law. lost: the share of commands that never arrived, and the gain of
+    nominal: the nominal fit. lost: the share of commands that never arrived, and the gain of
     saying so; the windows' commands are then those that did, those `sent` (rows of a piece, pieces, 2) are kept.
     """
 
@@ -59,7 +57,6 @@ class Prepared(NamedTuple):
     horizon: float
     frames: Frames
     nominal: Solution
-    law: Law
     lost: tuple[float, float] = (0.0, 0.0)
     sent: Any = None
 
@@ -95,33 +92,20 @@ def prepare(
     vector = neutral_vector(starting_point(fitted, pieces) if nominal is None else nominal)
     first = rough_fit(windows, vector, law)
     found = Prepared(given, largest, windows, judging, naming, only(given, pieces), rows, horizon,
-                     Frames(frozen, frozen), first, law or first_law(windows))  # fmt: skip
+                     Frames(frozen, frozen), first)  # fmt: skip
     if law is not None:
         return found
     outlying, windows, first = without_outliers(fitted, windows, first, pieces)
-    first, law = _settled(first, windows)
-    return found._replace(windows=windows, frames=frames_of(fitted, frozen, outlying), nominal=first, law=law)
+    return found._replace(
+        windows=windows, frames=frames_of(fitted, frozen, outlying), nominal=lower_valley(first, windows)
+    )
 
 
-def _settled(fit: Solution, windows: Windows) -> tuple[Solution, Law]:
-    """The nominal fit in the lower of two valleys, and the noise law of what it leaves."""
-    law = _sized(fit, windows)
-    other = better_valley(fit, windows, law)
-    return (fit, law) if other is None else (other, _sized(other, windows))
-
-
-def _sized(fit: Solution, windows: Windows) -> Law:
-    """The noise law of what a nominal fit leaves."""
-    responses = respond(np.exp(fit.vector[:2]), fit.linear.residual, windows)
-    return size_noise(fit.linear.residual, fit.linear.starts, windows, responses)
-
-
-def repaired(prepared: Prepared, lost: Lost, worth: float) -> Prepared:
-    """With the commands that arrived in place of those that were sent, which is worth some gain."""
+def repaired(prepared: Prepared, lost: Lost) -> Prepared:
+    """With the commands that arrived in place of those that were sent."""
     windows = prepared.windows._replace(command=lost.arrived)
-    share, gain = prepared.lost
     sent = prepared.windows.command if prepared.sent is None else prepared.sent
-    return prepared._replace(windows=windows, lost=(share + lost.share, gain + worth), sent=sent)
+    return prepared._replace(windows=windows, lost=(lost.share, lost.gain), sent=sent)
 
 
 def horizon_rows(horizon: float | None, period: float) -> tuple[int, float]:

@@ -9,12 +9,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.candidates import ENOUGH, PENALTY
-from jaxident.diagnosis.causes.scores import differences, seeded, sizes_of
-from jaxident.diagnosis.causes.search import Data, Solution
+from jaxident.diagnosis.causes.columns import AMPLITUDE
+from jaxident.diagnosis.causes.evidence import CHANCE
+from jaxident.diagnosis.causes.points import differences, seeded, sizes_of
+from jaxident.diagnosis.causes.refit import Data, Solution
 from jaxident.diagnosis.motion.linear import gram, linearise, normal
 from jaxident.effects.catalogue import CATALOGUE
-from jaxident.effects.coordinates import COORDINATES, PLACES, SMOOTH, from_catalogue, unit_factors
+from jaxident.effects.coordinates import COORDINATES, PLACES, SMOOTH, from_catalogue, sizes, unit_factors
 
 FAINT = 40.0
 """Expected gain of the replayed effects: two to three times what a claim asks for."""
@@ -25,10 +26,12 @@ DRAWS = 400
 class Answers(NamedTuple):
     """products (n, n): Gram matrix of whitened answers of the poses, nominal parameters and start states projected out.
     own: by effect its columns, one per coordinate, or that at typical size where it has no derivative at neutral;
-    parts: how much of each of these a faint effect has; typical: by effect the column of its typical size."""
+    scale: prior standard deviation of what each of these is multiplied with; parts: how much of each a faint effect
+    has; typical: by effect the column of its typical size."""
 
     products: Any
     own: dict[str, list[int]]
+    scale: dict[str, Any]
     parts: dict[str, list[float]]
     typical: dict[str, int]
 
@@ -48,15 +51,17 @@ def answers(data: Data, nominal: Solution, largest: float) -> Answers:
     smooth = {name: [PLACES[name, key] for key in keys] for name, keys in sized.items()}
     places = [place for own in smooth.values() for place in own]
     linear = linearise(nominal.vector, nominal.starts, data.windows, [*nominal.places, *places])
-    sizes = {name: _typical(name, largest, duration) for name in COORDINATES}
-    change = differences(data, nominal, [seeded(nominal.vector, name, size) for name, size in sizes.items()])
+    usual = {name: _typical(name, largest, duration) for name in COORDINATES}
+    change = differences(data, nominal, [seeded(nominal.vector, name, size) for name, size in usual.items()])
     columns = np.concatenate([linear.slopes, change], axis=2)
     products = gram(data.whitener, columns, linear.starts).products.sum(axis=0)
     order = {place: k for k, place in enumerate(places)}
     typical = {name: len(places) + k for k, name in enumerate(COORDINATES)}
     own = {name: [order[p] for p in smooth[name]] if name in smooth else [typical[name]] for name in COORDINATES}
-    parts = {name: [sizes[name][key] for key in sized[name]] if name in sized else [1.0] for name in COORDINATES}
-    return Answers(_without(products, len(nominal.places)), own, parts, typical)
+    parts = {name: [usual[name][key] for key in sized[name]] if name in sized else [1.0] for name in COORDINATES}
+    prior = sizes()
+    scale = {name: prior[smooth[name]] if name in smooth else np.array([AMPLITUDE]) for name in COORDINATES}
+    return Answers(_without(products, len(nominal.places)), own, scale, parts, typical)
 
 
 def visible(found: Answers) -> dict[str, float]:
@@ -66,7 +71,7 @@ def visible(found: Answers) -> dict[str, float]:
 
 def replay(found: Answers, seed: int = 0) -> Replay:
     """Faint effects, each as large as makes its expected gain FAINT, named under replayed noise as the search names
-    them: by the largest evidence, if that is ENOUGH."""
+    them: by the largest log evidence, if that is above zero."""
     rng = np.random.default_rng(seed)
     gains = visible(found)
     names = tuple(name for name, gain in gains.items() if gain > 1e-3)
@@ -80,18 +85,18 @@ def replay(found: Answers, seed: int = 0) -> Replay:
         if hidden:
             cross += np.sqrt(FAINT / max(power[hidden], 1e-12)) * faint[hidden][:, None]
         evidence = np.stack([_evidence(found, name, cross) for name in names])
-        named = np.where(evidence.max(axis=0) > ENOUGH, 1 + evidence.argmax(axis=0), 0)
+        named = np.where(evidence.max(axis=0) > 0.0, 1 + evidence.argmax(axis=0), 0)
         table[row] = np.bincount(named, minlength=len(table)) / len(named)
     return Replay(names, table)
 
 
 def _evidence(found: Answers, name: str, cross: Array) -> np.ndarray:
-    """Gain of an effect (draws,) less the price of its coordinates, from products with the residual (n, draws)."""
-    own = found.own[name]
-    scale = np.sqrt(np.maximum(np.diagonal(found.products)[own], 1e-300))
-    matrix = found.products[np.ix_(own, own)] / scale[:, None] / scale + 1e-9 * np.eye(len(own))
-    right = cross[own] / scale[:, None]
-    return 0.5 * np.sum(right * np.linalg.solve(matrix, right), axis=0) - PENALTY * len(COORDINATES[name])
+    """Log evidence of an effect (draws,), from products with the residual (n, draws), as in `causes.evidence`."""
+    own, scale = found.own[name], found.scale[name]
+    precision = found.products[np.ix_(own, own)] * scale[:, None] * scale + np.eye(len(own))
+    right = cross[own] * scale[:, None]
+    room = 0.5 * float(np.linalg.slogdet(precision)[1])
+    return 0.5 * np.sum(right * np.linalg.solve(precision, right), axis=0) - room + CHANCE
 
 
 def _typical(name: str, largest: float, duration: float) -> dict[str, float]:

@@ -6,15 +6,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.diagnosis.account.measure import measure
-from jaxident.diagnosis.causes.candidates import ENOUGH, Finding
 from jaxident.diagnosis.causes.direct import direct_effects, direct_evidence, present
+from jaxident.diagnosis.causes.finding import CLAIMED, Finding, find_effects
 from jaxident.diagnosis.causes.lost import gain_beyond
-from jaxident.diagnosis.causes.search import refit
-from jaxident.diagnosis.causes.which import search_effects
-from jaxident.diagnosis.common import MOSTLY, Values, explain_together
+from jaxident.diagnosis.causes.refit import refit
+from jaxident.diagnosis.common import MOSTLY, explain_together
 from jaxident.diagnosis.noise.law import Law, deviations, first_law
 from jaxident.diagnosis.prepare import Prepared, prepare
-from jaxident.diagnosis.repair import search
 from jaxident.effects.catalogue import BY_CHANCE
 from jaxident.effects.checks import check_effects
 from jaxident.effects.coordinates import vector_of
@@ -43,7 +41,7 @@ class Simulator(NamedTuple):
     vector: Any
     effects: tuple[str, ...]
     finding: Finding | None = None
-    price: float = ENOUGH
+    price: float = CLAIMED
     excess: float = 0.0
 
 
@@ -74,26 +72,23 @@ def _answers(log: Log) -> tuple[float, float]:
     return float(np.mean(moved / time)) / command, float(np.median(turn / time)) / command
 
 
-def inspect_simulator(
-    sim: Log | Sequence[Log], prepared: Prepared, finding: Finding
-) -> tuple[Simulator, Finding, Values]:
-    """The simulator behind some logs; the robot's search with the set selected that explains both best together; and
-    what `judge` takes for the values of sets."""
+def inspect_simulator(sim: Log | Sequence[Log], prepared: Prepared, finding: Finding) -> tuple[Simulator, Finding]:
+    """The simulator behind some logs, and the robot's search with names that agree with the simulator's where they
+    can."""
     own, found, noisy = _search(sim, prepared, finding)
     together = explain_together(finding, found)
-    fit = together.simulator.candidates[together.simulator.selected]
-    shared_effects = tuple(name for name in fit.effects if name not in together.missing)
-    effects = (*shared_effects, *_direct((own, found), (prepared, finding), together.price))
+    effects = (*together.effects, *_direct((own, found), (prepared, finding), together.price))
     excess = _excess(own, together.simulator) if noisy else 0.0
-    simulator = Simulator(fit.solution.vector, effects, together.simulator, together.price, excess)
-    return simulator, together.robot, together.values
+    return Simulator(together.fit.vector, effects, together.simulator, together.price, excess), together.robot
 
 
 def _direct(sim: tuple[Prepared, Finding], robot: tuple[Prepared, Finding], price: float) -> list[str]:
     """Effects that show without a refit and that a simulator has as well, by both sides' logs and searches. A memory of
     its camera counts however few windows show it: what looks like one in both is no difference."""
     found = direct_evidence(*sim)
-    worth = {name: value for name, value in found.items() if value > ENOUGH or (name == MEMORY and sim[1].law.coloured)}
+    worth = {
+        name: value for name, value in found.items() if value > CLAIMED or (name == MEMORY and sim[1].law.coloured)
+    }
     theirs, own = (direct_effects(*side, tuple(worth)) for side in (sim, robot))
     scale = len(robot[0].log.t) / max(len(sim[0].log.t), 1)
     beyond = {name: value - scale * worth.get(name, 0.0) for name, value in direct_evidence(*robot).items()}
@@ -105,9 +100,8 @@ def _direct(sim: tuple[Prepared, Finding], robot: tuple[Prepared, Finding], pric
 def _lost_beyond(prepared: Prepared, finding: Finding, share: float) -> float:
     """What the robot's own share of lost commands explains beyond what the simulator's does. Even a small one lets in
     every change that was late beyond doubt; what these are worth is no difference."""
-    fit = finding.candidates[finding.selected]
     data = finding.data._replace(windows=finding.data.windows._replace(command=prepared.sent))
-    return gain_beyond(data, refit(data, fit.solution.vector, fit.solution.starts, fit.effects), share)
+    return gain_beyond(data, refit(data, finding.fit.vector, finding.fit.starts, finding.selected), share)
 
 
 def rarer(
@@ -126,8 +120,8 @@ def _search(sim: Log | Sequence[Log], prepared: Prepared, finding: Finding) -> t
     law, nominal = Law(*deviations(finding.law)[1:]), finding.nominal.vector[:10]
     own = prepare(sim, prepared.horizon, nominal, prepared, law)
     if is_noisy(first_law(own.windows), finding.law):
-        return *search(prepare(sim, prepared.horizon, nominal, prepared)), True
-    return own, search_effects(own.windows, own.nominal, law, sized=False), False
+        return *find_effects(prepare(sim, prepared.horizon, nominal, prepared)), True
+    return *find_effects(own, law=law), False
 
 
 def is_noisy(white: Law, robot: Law) -> bool:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.search import Solution
+from jaxident.diagnosis.causes.refit import Solution
 from jaxident.diagnosis.noise.law import Law, deviations
 from jaxident.diagnosis.prepare import Prepared
 from jaxident.effects.catalogue import BY_CHANCE

@@ -5,25 +5,25 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxident.diagnosis.account.measure import Gap
-from jaxident.diagnosis.causes.candidates import ENOUGH, Finding, value
-from jaxident.diagnosis.causes.unexplained import UNEXPLAINED
-from jaxident.diagnosis.common import Values
+from jaxident.diagnosis.causes.finding import CLAIMED, Finding
 from jaxident.diagnosis.simulator import Simulator
 from jaxident.effects.catalogue import CATALOGUE, SITES
 
-TEMPERATURE, INEXACT = 2.0, 0.002
-"""Differences of evidence count for half, as the noise law is never quite right; and for less the more there is to
-explain, of which a part is added, as the forms of the effects are not: 1 % of all that is explained is no proof."""
-SIGNIFICANT = 20.0
-"""Fall of -log p that the corrector must bring beyond the best set, besides its share, for a gap to be unknown."""
-SHARPNESS = 0.04, 4.0
+SIGNIFICANT, SHARE = 20.0, 0.05
+"""Fall of -log p that terms in no catalogue must bring beyond the best set, and their part of all that is explained,
+for something to take part that has no name. On simulated robots with one effect of the catalogue beside one of none the
+part was 0.05 to 0.9."""
+SHARPNESS = 0.01, 4.0
 """Width of both thresholds: how slowly probability passes from known to unknown."""
+HIDDEN, HIDDEN_SHARPNESS = 0.2, 0.04
+"""Part of the error that the corrected model leaves, and the width of that threshold, from which on slip may hide a
+cause."""
 EXCESS = 2.0
 """A gap is unknown where the corrected model's error on runs that serve nothing else, at the low end of its interval,
 is this many times what noise could make it at most."""
 BELIEVABLE = 0.025
 """Random slip beyond this part of full drive, at a correlation time of SLOW [s], is a cause nobody has found yet, but
-where the selected set explains all but UNEXPLAINED of the error: wheels that slide never do so quite as a model has."""
+where the selected set explains all but HIDDEN of the error: wheels that slide never do so quite as a model has."""
 MORE = 2.0
 """Times a simulator's slip, and excess, that a robot's may be: slip of two halves of one log of a real robot differs by
 up to 1.7."""
@@ -32,8 +32,8 @@ SLOW = 0.2
 WIDTH = 0.12
 """Of both thresholds, as a logarithm."""
 ALIKE = 3.0
-"""Effects whose evidence in place of another falls short of its by less than so many temperatures cannot be told from
-it: they are more than a twentieth as likely."""
+"""Log evidence by which a set may be behind another that it cannot be told from: it is more than a twentieth as
+likely."""
 NOWHERE = {"actuation": 0.2, "drive": 0.4, "contact": 0.4, "time": 0.0, "camera": 0.0}
 """Sites of a gap that no term of the corrector places."""
 
@@ -69,40 +69,23 @@ class Judgement(NamedTuple):
         return 1.0 - self.none * (1.0 - self.unexplained)
 
 
-def judge(
-    finding: Finding,
-    gap: Gap,
-    extra: dict[str, float],
-    simulator: Simulator | None = None,
-    values: Values | None = None,
-) -> Judgement:
-    """Probabilities from the candidates, from what they leave unexplained, and from effects found directly in the
-    frames or in the noise law (`extra`: name to evidence). What the simulator has already is no gap. values: of every
-    set what it is worth and what of it counts, by `explain_together`; from the candidates alone without."""
+def judge(finding: Finding, gap: Gap, extra: dict[str, float], simulator: Simulator | None = None) -> Judgement:
+    """Probabilities from the log evidence of the selected set and its neighbours, from what they leave unexplained, and
+    from effects that show in the frames or in the noise law (`extra`: name to evidence). What the simulator has already
+    is no gap."""
     known_there = () if simulator is None else simulator.effects
-    if values is None:
-        values = {
-            effects: (value(c, finding.asked), tuple(name for name in effects if name not in known_there))
-            for effects, c in finding.candidates.items()
-        }
-    sure = {name for name, evidence in extra.items() if evidence > ENOUGH} - set(known_there)
-    weights = {effects: worth / temperature(finding) for effects, (worth, _) in values.items()}
-    top = max(weights.values())
-    total = sum(np.exp(weight - top) for weight in weights.values())
+    sure = {name for name, evidence in extra.items() if evidence > CLAIMED} - set(known_there)
+    top = max(finding.values.values())
+    total = sum(np.exp(value - top) for value in finding.values.values())
     unexplained = unexplained_probability(finding, gap, simulator)
     sets: dict[tuple[str, ...], float] = {}
-    for effects, weight in weights.items():
-        key = tuple(sorted({*values[effects][1], *sure}))
-        sets[key] = sets.get(key, 0.0) + float(np.exp(weight - top) / total)
+    for effects, value in finding.values.items():
+        key = tuple(sorted({*effects - set(known_there), *sure}))
+        sets[key] = sets.get(key, 0.0) + float(np.exp(value - top) / total)
     ordered = sorted(((key, p) for key, p in sets.items() if p > 1e-4), key=lambda pair: -pair[1])
     spare = 1.0 - sum(p for _, p in ordered)
     ordered = [(key, p + spare if k == 0 else p) for k, (key, p) in enumerate(ordered)]
     return Judgement(unexplained, ordered, _causes(finding, ordered), _sites(finding, ordered, unexplained))
-
-
-def temperature(finding: Finding) -> float:
-    """The difference of evidence that makes one set e times as likely as another."""
-    return TEMPERATURE + INEXACT * max(finding.candidates[finding.selected].gain, 0.0)
 
 
 def unexplained_probability(finding: Finding, gap: Gap, simulator: Simulator | None = None) -> float:
@@ -112,20 +95,20 @@ def unexplained_probability(finding: Finding, gap: Gap, simulator: Simulator | N
     between the two."""
     rest = rest_of(finding, simulator)
     large = _logistic((rest - SIGNIFICANT) / SHARPNESS[1])
-    explained = large * _logistic((finding.share(rest) - UNEXPLAINED) / SHARPNESS[0])
+    explained = large * _logistic((finding.share(rest) - SHARE) / SHARPNESS[0])
     missed = _beyond(gap.excess, believable_excess(simulator))
     slipping = _beyond(slip_of_drive(finding), believable_slip(simulator))
-    slipping *= _logistic((gap.left - UNEXPLAINED) / SHARPNESS[0])
+    slipping *= _logistic((gap.left - HIDDEN) / HIDDEN_SHARPNESS)
     return 1.0 - (1.0 - explained) * (1.0 - missed) * (1.0 - slipping)
 
 
 def rest_of(finding: Finding, simulator: Simulator | None = None) -> float:
     """What terms of the corrector explain, beyond what they explain of as many windows of the simulator."""
     if simulator is None or simulator.finding is None:
-        return finding.rest
+        return finding.rest.gain
     other = simulator.finding
     windows = len(finding.data.windows.run) / max(len(other.data.windows.run), 1)
-    return max(finding.rest - windows * other.rest, 0.0)
+    return max(finding.rest.gain - windows * other.rest.gain, 0.0)
 
 
 def believable_slip(simulator: Simulator | None = None) -> float:
@@ -149,8 +132,7 @@ def slip_of_drive(finding: Finding) -> float:
     law = finding.law
     if law.slip is None or law.slip_time is None:
         return 0.0
-    vector = finding.candidates[finding.selected].solution.vector
-    full = np.abs(vector[2:6]).reshape(2, 2).sum(axis=1)
+    full = np.abs(finding.fit.vector[2:6]).reshape(2, 2).sum(axis=1)
     return float(np.max(np.array(law.slip) / full) * np.sqrt(law.slip_time / SLOW))
 
 
@@ -178,20 +160,17 @@ def alike(finding: Finding, name: str) -> tuple[str, ...]:
     """Effects that in place of one in the selected set leave the evidence nearly as good."""
     if name not in finding.selected:
         return ()
-    rest = set(finding.selected) - {name}
-    least = max(finding.candidates[finding.selected].evidence - ALIKE * temperature(finding), ENOUGH)
-    rivals = [
-        e for e, c in finding.candidates.items() if len(e) == len(rest) + 1 and rest < set(e) and c.evidence > least
-    ]
-    return tuple(sorted({other for effects in rivals for other in set(effects) - rest} - {name}))
+    rest = frozenset(finding.selected) - {name}
+    rivals = [e for e, worth in finding.values.items() if len(e) == len(rest) + 1 and rest < e and worth > -ALIKE]
+    return tuple(sorted({other for effects in rivals for other in effects - rest} - {name}))
 
 
 def _sites(finding: Finding, sets, unexplained: float) -> dict[str, float]:
     """Probability that each site takes part; an unknown cause lies where the corrector's terms do, and without any
     somewhere between motors and ground, as what cannot be told from slip does."""
-    rest, found = finding.rest, {}
+    rest, found = finding.rest.gain, {}
     for site in SITES:
         known = sum(p for effects, p in sets if any(CATALOGUE[name].site == site for name in effects))
-        lies = sum(gain for term, gain in finding.terms if term.site == site) / rest if rest else NOWHERE[site]
+        lies = sum(gain for term, gain in finding.rest.terms if term.site == site) / rest if rest else NOWHERE[site]
         found[site] = float(min(known + unexplained * lies, 1.0))
     return found

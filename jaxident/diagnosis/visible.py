@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from jaxident.diagnosis.causes.candidates import ENOUGH
+from jaxident.diagnosis.causes.finding import CLAIMED
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.coordinates import COORDINATES, SEARCHED, SHAPES, from_catalogue, to_catalogue
 
@@ -13,7 +13,7 @@ ALL_OR_NOTHING = {name for name, search in SEARCHED.items() if search.all_or_not
 
 
 def smallest_sizes(visible: Mapping[str, float]) -> dict[str, dict[str, float] | None]:
-    """The parameters at which each effect's gain would just be ENOUGH, {effect: {parameter: value}}, from its gain at
+    """The parameters at which each effect's gain would just be CLAIMED, {effect: {parameter: value}}, from its gain at
     typical size: gains grow with the square of what is linear in the path, which for a limit is its inverse.
 
     None for effects that show nothing at any size, or whose gain has no such law.
@@ -24,7 +24,7 @@ def smallest_sizes(visible: Mapping[str, float]) -> dict[str, dict[str, float] |
 def _smallest(name: str, gain: float) -> dict[str, float] | None:
     if gain <= 0.0 or name in ALL_OR_NOTHING:
         return None
-    ratio = float(np.sqrt(ENOUGH / gain))
+    ratio = float(np.sqrt(CLAIMED / gain))
     typical = from_catalogue(name, CATALOGUE[name].typical())
     scaled = {
         c.name: typical[c.name] if (name, c.name) in SHAPES else c.neutral + ratio * (typical[c.name] - c.neutral)

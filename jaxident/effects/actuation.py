@@ -116,7 +116,7 @@ RECORDS = (
         parameters=(Parameter("step", UNIT, 0.0, (0.01, 0.25), 0.15, least=0.0),),
         channels=BOTH,
         act=input_quantisation, rank=3, smooth=False, grid=(0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25),
-        search=Search((positive("step", 0.6, stepped=True, reach=(2e-3, 2e-4), relative=True),), seeds=_steps,
+        search=Search((positive("step", 0.6, stepped=True, reach=(1e-2, 2e-3, 2e-4), relative=True),), seeds=_steps,
                       suggested=Suggested("steps", lambda step: {"step": float(step)})),
     ),
     EffectRecord(

@@ -40,7 +40,7 @@ def diagnosis_to_dict(found: Diagnosis) -> dict[str, Any]:
         "parameters": [p._asdict() for p in found.parameters],
         "not_testable": found.not_testable,
         "replays": _replays(found.replay),
-        "terms": [{"site": term.site, "term": term.name, "gain": gain} for term, gain in found.finding.terms],
+        "terms": [{"site": term.site, "term": term.name, "gain": gain} for term, gain in found.finding.rest.terms],
         "next": found.next,
     }
 

@@ -5,18 +5,18 @@ from collections.abc import Iterable
 import numpy as np
 
 from jaxident import plot
-from jaxident.diagnosis.causes.candidates import ENOUGH, PENALTY, Candidate, value
+from jaxident.diagnosis.causes.finding import CLAIMED, Entrant
 from jaxident.diagnosis.diagnose import Diagnosis
 from jaxident.diagnosis.replay import DRAWS, FAINT, Replay
 from jaxident.diagnosis.verdict import believable_excess, believable_slip, rest_of, slip_of_drive
 from jaxident.diagnosis.visible import smallest_sizes
 from jaxident.effects.catalogue import CATALOGUE
-from jaxident.effects.coordinates import ASIDE, COORDINATES, PLACES
+from jaxident.effects.coordinates import ASIDE, PLACES
 from jaxident.report.page import Figure, Section, Table
 from jaxident.report.words import EFFECTS, chance, number, parameters, percent, plain, together
 
 SHOWN = 10
-"""Candidates in a picture: the best of them."""
+"""Effects in a picture: the best of them."""
 
 
 def causes(found: Diagnosis) -> Section:
@@ -34,9 +34,10 @@ def causes(found: Diagnosis) -> Section:
 
 
 RANKING = (
-    "Every effect of the catalogue was scored; the most promising were fitted in full, the nominal parameters along "
-    "with them. The gain is how much better the runs are then explained. It must pay for each number of the effect, "
-    "for chance and, beside others, for what may be their form, before the effect is claimed: that is the black tick."
+    "Sets of effects are compared by their evidence. The gain of an effect is how much better it explains the runs "
+    "beside the others of its set, nominal parameters refitted. An effect is claimed from the black tick on. The tick "
+    "pays for the numbers of the effect, for the many effects that were looked at, and for stretches that do not agree "
+    "on it."
 )
 
 
@@ -66,8 +67,7 @@ def _untold(found: Diagnosis) -> list[str]:
     """A word on what no log with these effects can tell."""
     if ASIDE[0] not in found.selected:
         return []
-    best = found.finding.candidates[found.finding.selected].solution
-    return [] if PLACES[ASIDE] in best.places else [BESIDE]
+    return [] if PLACES[ASIDE] in found.finding.fit.places else [BESIDE]
 
 
 BESIDE = (
@@ -77,28 +77,22 @@ BESIDE = (
 
 
 def _ranking(found: Diagnosis) -> Figure | str:
-    """The best candidates, sets of several effects among them, with their probabilities."""
-    finding = found.finding
-    best = sorted((c for e, c in finding.candidates.items() if e), key=lambda c: -c.evidence)[:SHOWN]
+    """The effects of the corrected model, what could stand in for them, and what comes nearest to joining them."""
+    alike = {other for cause in found.judgement.causes for other in cause.indistinguishable_from}
+    best = sorted(found.finding.entrants(alike), key=lambda entrant: -entrant.evidence)[:SHOWN]
     if not best:
         return "No effect promised enough to be fitted."
-    sets: dict[tuple[str, ...], float] = {}
-    for effects, p in found.judgement.sets:
-        searched = tuple(sorted(name for name in effects if name in COORDINATES))
-        sets[searched] = sets.get(searched, 0.0) + p
-    best.sort(key=lambda c: -c.gain)
-    alike = {other for cause in found.judgement.causes for other in cause.indistinguishable_from}
-    names = [_label(c.effects) for c in best]
-    groups = {name: _group(c, found, alike) for name, c in zip(names, best, strict=True)}
-    notes = {n: chance(sets.get(tuple(sorted(c.effects)), 0.0)) for n, c in zip(names, best, strict=True)}
-    needed = {n: c.gain - value(c, finding.asked) for n, c in zip(names, best, strict=True)}
+    best.sort(key=lambda entrant: -entrant.gain)
+    taking = {cause.effect: cause.probability for cause in found.judgement.causes}
+    names = {_entrant(each): each for each in best}
+    groups = {name: _group(each, found) for name, each in names.items()}
     figure, ax = plot.figure(size=(6.3, 1.0 + _row(names) * max(len(best), 2)))
-    plot.ranking({n: c.gain for n, c in zip(names, best, strict=True)}, needed, notes=notes,
+    plot.ranking({name: each.gain for name, each in names.items()},
+                 {name: each.gain - each.evidence for name, each in names.items()},
+                 notes={name: chance(taking.get(each.effect, 0.0)) for name, each in names.items()},
                  groups={name: group for name, group in groups.items() if group}, ax=ax)  # fmt: skip
-    count = len(finding.candidates) - 1
-    which = f"The {SHOWN} best of {count} candidates" if count > SHOWN else "All candidates that were fitted"
-    caption = f"{which}, those that together make a set among them; behind each bar the probability of that very set."
-    return Figure(plot.image(figure), "Candidate effects by the gain that each brings", caption)
+    caption = "The most promising effects; behind each bar the probability that the effect takes part."
+    return Figure(plot.image(figure), "Effects by the gain that each brings beside the others", caption)
 
 
 def _row(names: Iterable[str]) -> float:
@@ -110,17 +104,19 @@ def _label(effects: tuple[str, ...]) -> str:
     return "\n+ ".join(plain(name) for name in effects)
 
 
-def _group(candidate: Candidate, found: Diagnosis, alike: set[str]) -> str:
-    if candidate.effects == found.finding.selected:
-        return "corrected model"
-    rest = set(candidate.effects) - set(found.finding.selected)
-    same_size = len(candidate.effects) == len(found.finding.selected)
-    return "looks alike" if rest and rest <= alike and same_size else ""
+def _entrant(each: Entrant) -> str:
+    return plain(each.effect) + (f"\nfor {plain(each.instead)}" if each.instead else "")
+
+
+def _group(each: Entrant, found: Diagnosis) -> str:
+    if each.instead:
+        return "looks alike"
+    return "corrected model" if each.effect in found.finding.selected else ""
 
 
 def _unexplained(found: Diagnosis) -> list[str | Table]:
     """What a library of forces, speeds and camera errors explains beyond the best set."""
-    terms = found.finding.terms
+    terms = found.finding.rest.terms
     if not terms:
         return [*_beyond_words(found), NO_TERMS]
     rows = [(term.name, term.site, float(gain)) for term, gain in terms]
@@ -130,7 +126,7 @@ def _unexplained(found: Diagnosis) -> list[str | Table]:
         "so the words small and large, are over the largest one."
     )
     if found.simulator is not None and found.simulator.finding is not None:
-        own = rest_of(found.finding, found.simulator) / max(found.finding.rest, 1e-9)
+        own = rest_of(found.finding, found.simulator) / max(found.finding.rest.gain, 1e-9)
         text += f" Of that, {percent(own)} is beyond what the simulator's logs leave unexplained as well."
     table = Table(("term", "site", "gain"), rows, "They are no effects by name; they say where to look.")
     return [text, table, *_beyond_words(found)]
@@ -191,7 +187,7 @@ def hidden(found: Diagnosis) -> Section:
         shown = {key: typical[key] for key in (size or typical)}
         least = "–" if size is None else parameters(name, size)
         rows.append(
-            (plain(name), parameters(name, shown), float(f"{gain:.3g}"), "yes" if gain >= ENOUGH else "no", least)
+            (plain(name), parameters(name, shown), float(f"{gain:.3g}"), "yes" if gain >= CLAIMED else "no", least)
         )
     missed = found.not_testable
     lead = (
@@ -231,8 +227,8 @@ REPLAYS_CAPTION = (
 
 
 HIDDEN_CAPTION = (
-    f"Gain at the typical size, nominal parameters refitted; visible from {ENOUGH:g} on, to which the smallest size is "
-    f"scaled. A claim asks for {PENALTY:g} more for each number of the effect."
+    f"Gain at the typical size, nominal parameters refitted; visible from {CLAIMED:g} on, to which the smallest size "
+    "is scaled. A claim pays for each number of the effect as well."
 )
 DIRECT = (
     "Frozen frames, outliers and camera errors that persist are looked for in the frames themselves and in the noise; "

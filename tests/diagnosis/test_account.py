@@ -9,10 +9,11 @@ import jax
 import numpy as np
 import pytest
 
-from jaxident.diagnosis.account.account import account_of, shapley
+from jaxident.diagnosis.account.account import account_of
 from jaxident.diagnosis.account.floor import Floor, floor_of
 from jaxident.diagnosis.account.judging import judge_model
 from jaxident.diagnosis.account.luck import luck, luck_of_chance
+from jaxident.diagnosis.account.shapley import shapley
 from jaxident.diagnosis.account.slip_check import slip_seen
 from jaxident.diagnosis.motion.windows import whole_runs
 from jaxident.diagnosis.noise.doubt import Draws

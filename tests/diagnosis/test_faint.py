@@ -4,18 +4,19 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from support.small_robot import LAW, ROWS, RUNS, VECTOR, nominal_fit, windows_of
 
+from jaxident.diagnosis.causes.columns import tabulate
 from jaxident.diagnosis.causes.lost import find_lost, gain_beyond
+from jaxident.diagnosis.causes.moves import fit_options, stands
+from jaxident.diagnosis.causes.points import at_best
+from jaxident.diagnosis.causes.refit import best_starts, refit
 from jaxident.diagnosis.causes.rhythm import _travels, rhythms
-from jaxident.diagnosis.causes.scores import INSTANT, at_best, beginnings
-from jaxident.diagnosis.causes.scores import STEP as STEP_OF
-from jaxident.diagnosis.causes.search import Data, best_starts, refit
+from jaxident.diagnosis.causes.search import best_set
 from jaxident.diagnosis.causes.steps import likely_steps
 from jaxident.diagnosis.frames import find_more_outliers, find_outliers, has_outliers
-from jaxident.diagnosis.motion.linear import explained, follow, gram
+from jaxident.diagnosis.motion.linear import follow, gram, left_over
 from jaxident.diagnosis.motion.responses import respond
-from jaxident.diagnosis.motion.windows import cut
-from jaxident.diagnosis.noise.law import Law, white_whitener
 from jaxident.diagnosis.replay import Answers, answers, replay, visible
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.coordinates import (
@@ -23,42 +24,8 @@ from jaxident.effects.coordinates import (
     PLACES,
     by_effect,
     from_catalogue,
-    neutral_vector,
-    nominal_vector,
     to_catalogue,
 )
-from jaxident.log import join, make_log
-from jaxident.robot.drive import Physical
-
-ROWS, RUNS, STEP = 320, 3, 0.03
-LAW = Law(2e-4, 2e-3)
-VECTOR = neutral_vector(
-    nominal_vector(Physical(np.array([3.0, 5.0]), np.array([[0.5, 0.4], [9.0, -8.5]])), np.array([0.1, 0.12]))
-)
-
-
-def windows_of(vector, seed=0, late=0):
-    """Windows of noisy poses that the follower itself makes from whole runs, so that a fit of its form is exact; every
-    fifth change of the command `late` rows."""
-    rng = np.random.default_rng(seed)
-    runs, t = [], np.arange(ROWS) * STEP
-    for _ in range(RUNS):
-        u = np.repeat(np.round(rng.uniform(-1.0, 1.0, (ROWS // 10, 2)), 3), 10, axis=0)
-        runs.append(make_log(t, u[:, 0], u[:, 1], 0.0 * t, 0.0 * t, 0.0 * t))
-    whole = cut(join(runs), ROWS)
-    for row in range(50, ROWS, 50):
-        whole.command[row : row + late] = whole.command[row - 1]
-    path = -follow(vector[None], np.zeros((1, 5, RUNS)), whole)[0].reshape(RUNS, ROWS, 3)
-    path = path + rng.normal(size=path.shape) * [LAW.position, LAW.position, LAW.heading]
-    poses = [log._replace(x=p[:, 0], y=p[:, 1], theta=p[:, 2]) for log, p in zip(runs, path, strict=True)]
-    return cut(join(poses), 40)
-
-
-def nominal_fit(windows):
-    data = Data(windows, white_whitener(LAW, windows))
-    begin = np.zeros((5, len(windows.run)))
-    begin[:3] = windows.pose[0].T
-    return data, refit(data, VECTOR, begin, ())
 
 
 @pytest.fixture(scope="module")
@@ -94,18 +61,18 @@ def test_a_payload_is_placed_where_it_came():
     begin[PLACES["payload_change", "loss"]], begin[place] = 0.1, 18.0
     held = (("payload_change", "instant"),)
     first = refit(data, begin, nominal.starts, ("payload_change",), held, most=4)
-    assert abs(at_best(data, first, INSTANT)[place] - 13.3) < 0.3
+    assert abs(at_best(data, first, ("payload_change", "instant"))[place] - 13.3) < 0.3
 
 
 def test_a_step_is_settled_to_where_commands_round_alike():
     """From 0.15 % off to within the step's own jumps: every command that is told rounds to the tooth it did."""
     vector = VECTOR.copy()
-    vector[PLACES[STEP_OF]] = true = 0.2159
+    vector[PLACES[("input_quantisation", "step")]] = true = 0.2159
     data, nominal = nominal_fit(windows_of(vector))
     begin = nominal.vector.copy()
-    begin[PLACES[STEP_OF]] = 1.0015 * true
+    begin[PLACES[("input_quantisation", "step")]] = 1.0015 * true
     first = refit(data, begin, nominal.starts, ("input_quantisation",), most=4)
-    found = at_best(data, first, STEP_OF)[PLACES[STEP_OF]]
+    found = at_best(data, first, ("input_quantisation", "step"))[PLACES[("input_quantisation", "step")]]
     teeth = [np.round(data.windows.command / step) for step in (true, 1.0015 * true, found)]
     assert np.any(teeth[0] != teeth[1])
     np.testing.assert_array_equal(teeth[0], teeth[2])
@@ -117,8 +84,10 @@ def test_a_lens_off_the_middle_of_the_field_is_found():
     for key, value in from_catalogue("lens_distortion", lens).items():
         vector[PLACES["lens_distortion", key]] = value
     data, nominal = nominal_fit(windows_of(vector))
-    (begin,) = beginnings(data, nominal, "lens_distortion")
-    found = refit(data, begin, nominal.starts, ("lens_distortion",))
+    table = tabulate(data, nominal, ())
+    (best,) = best_set(table._replace(options=[o for o in table.options if o.effect == "lens_distortion"]), [])
+    lenses = [k for k, option in enumerate(table.options) if option.effect == "lens_distortion"]
+    found = fit_options(data, table, stands(nominal, ()), [lenses[best]]).fit
     told = to_catalogue("lens_distortion", by_effect(found.vector)["lens_distortion"])
     for key, value in lens.items():
         assert told[key] == pytest.approx(value, abs=0.05), key
@@ -166,7 +135,7 @@ def test_rhythms_of_wheels_are_found_with_their_price(plain):
     def gains(solution, found):
         columns = np.stack([*(r.column for r in found), solution.linear.residual], axis=2)
         products = gram(data.whitener, columns, solution.linear.starts).products.sum(axis=0)
-        return [explained(products, [], [k]) - r.price for k, r in enumerate(found)]
+        return [left_over(products, []) - left_over(products, [k]) - r.price for k, r in enumerate(found)]
 
     quiet = rhythms(data, nominal, responses)
     assert max(gains(nominal, quiet)) < 9.0
@@ -229,7 +198,8 @@ def test_replays_of_effects_that_answer_apart_are_all_named():
         products[typical[name], :] = products[own[name][0], :]
         products[:, typical[name]] = products[:, own[name][0]]
     parts = {name: [1.0] + [0.0] * (len(own[name]) - 1) for name in names}
-    found = replay(Answers(products, own, parts, typical), 1)
+    scale = {name: np.full(len(own[name]), 10.0) for name in names}
+    found = replay(Answers(products, own, scale, parts, typical), 1)
     assert found.effects == tuple(names)
     assert np.all(np.diagonal(found.named)[1:] > 0.95)
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from jaxident.diagnosis.causes.corrector import pursue
-from jaxident.diagnosis.motion.linear import explained, follow, gram, linearise
+from jaxident.diagnosis.motion.linear import follow, gram, left_over, linearise
 from jaxident.diagnosis.motion.responses import answer_to_start
 from jaxident.diagnosis.motion.windows import cut
 from jaxident.effects.coordinates import PLACES, neutral_vector, nominal_vector
@@ -18,7 +18,7 @@ def squares(columns, target):
     return 0.5 * float(rest @ rest)
 
 
-def test_explained_is_a_difference_of_least_squares_with_starts_free():
+def test_what_is_left_over_is_that_of_least_squares_with_starts_free():
     rng = np.random.default_rng(0)
     windows, numbers = 4, 30
     columns, starts = rng.normal(size=(windows, numbers, 5)), rng.normal(size=(windows, numbers, 5))
@@ -30,7 +30,7 @@ def test_explained_is_a_difference_of_least_squares_with_starts_free():
     flat = (white @ columns).reshape(-1, 5)
     with_one = squares(np.hstack([own, flat[:, [0]]]), flat[:, 4])
     with_three = squares(np.hstack([own, flat[:, [0, 1, 2]]]), flat[:, 4])
-    assert explained(products, [0], [1, 2]) == pytest.approx(with_one - with_three, rel=1e-6)
+    assert left_over(products, [0]) - left_over(products, [0, 1, 2]) == pytest.approx(with_one - with_three, rel=1e-6)
 
 
 def test_pursuit_finds_what_was_put_in_and_stops():

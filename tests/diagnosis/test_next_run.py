@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from jaxident.array_types import AT_REST
-from jaxident.diagnosis.causes.search import Data, refit
+from jaxident.diagnosis.causes.refit import Data, refit
 from jaxident.diagnosis.motion.linear import follow
 from jaxident.diagnosis.motion.windows import cut, uncut
 from jaxident.diagnosis.noise.law import Law, whitener_of

@@ -6,7 +6,7 @@ from support.arcs import along_arcs
 
 from jaxident.diagnosis.motion.responses import answer_to_start, respond
 from jaxident.diagnosis.noise.doubt import MEMORIES, doubt_of, draw_laws, sizes_by_memory
-from jaxident.diagnosis.noise.law import Law, covariance, first_law, is_quieter, slip_parts, white_whitener, whitener_of
+from jaxident.diagnosis.noise.law import Law, covariance, first_law, slip_parts, white_whitener, whitener_of
 from jaxident.diagnosis.noise.sizing import sample, size_noise, size_one, steady_gain
 
 ROWS, COUNT = 45, 60
@@ -195,13 +195,3 @@ def test_fourth_differences_size_the_camera(made):
     found = first_law(windows._replace(pose=noisy))
     assert found.position == pytest.approx(5e-4, rel=0.1)
     assert found.heading == pytest.approx(4e-3, rel=0.1)
-
-
-def test_a_law_is_quieter_where_some_noise_has_lost_its_power():
-    law = Law(1e-3, 1e-2, slip=(0.02, 0.3), slip_time=0.8)
-    assert not is_quieter(law, law, 0.7)
-    assert is_quieter(law._replace(slip=(0.02, 0.2)), law, 0.7)
-    assert is_quieter(law._replace(slip_time=0.2), law, 0.7)
-    assert is_quieter(Law(1e-3, 1e-2), law, 0.7)
-    assert not is_quieter(law, Law(1e-3, 1e-2), 0.7)
-    assert not is_quieter(law._replace(slip=(0.04, 0.15), slip_time=0.8), law, 0.2)

@@ -4,10 +4,10 @@ import jax
 import numpy as np
 import pytest
 
-from jaxident.diagnosis.causes.search import Data, refit
+from jaxident.diagnosis.causes.refit import Data, refit
 from jaxident.diagnosis.motion.windows import cut
 from jaxident.diagnosis.noise.law import Law, white_whitener
-from jaxident.diagnosis.nominal import better_valley, first_starts, rough_fit, steady_point
+from jaxident.diagnosis.nominal import first_starts, lower_valley, rough_fit, steady_point
 from jaxident.effects.coordinates import neutral_vector, nominal_vector
 from jaxident.log import Log, join
 from jaxident.robot.drive import Physical
@@ -47,7 +47,8 @@ def test_a_fit_in_a_wrong_valley_gives_way_to_a_lower_one():
     data = Data(windows, white_whitener(LAW, windows))
     wrong = refit(data, neutral_vector(nominal_vector(slow, np.zeros(2))), first_starts(windows), (), most=1)
     right = rough_fit(windows, neutral_vector(nominal_vector(DRIVE, np.zeros(2))), LAW)
-    found = better_valley(wrong, windows, LAW)
-    assert found.cost == pytest.approx(right.cost, abs=1.0)
+    assert np.exp(wrong.vector[0]) < 0.1 * DRIVE.rate[0]
+    found = lower_valley(wrong, windows)
     assert np.exp(found.vector[:2]) == pytest.approx(DRIVE.rate, rel=0.02)
-    assert better_valley(right, windows, LAW) is None
+    assert found.vector[2:6] == pytest.approx(np.ravel(DRIVE.gain), rel=0.1)
+    assert lower_valley(right, windows) is right

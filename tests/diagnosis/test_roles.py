@@ -6,10 +6,10 @@ import pytest
 
 from jaxident.diagnosis.account.models import LOST
 from jaxident.diagnosis.causes.direct import direct_effects, direct_evidence, present
+from jaxident.diagnosis.causes.finding import find_effects
 from jaxident.diagnosis.motion.paths import track
 from jaxident.diagnosis.motion.windows import cut
 from jaxident.diagnosis.prepare import BURN, FEWEST, judging_starts, prepare, shows_start
-from jaxident.diagnosis.repair import search
 from jaxident.diagnosis.roles import LONGEST, PARTS, split
 from jaxident.effects.coordinates import PLACES, neutral_vector, nominal_vector
 from jaxident.effects.simulate import simulate
@@ -80,7 +80,7 @@ def logs():
 
 
 def found(logs):
-    prepared, finding = search(prepare(logs, None))
+    prepared, finding = find_effects(prepare(logs, None))
     direct = direct_effects(prepared, finding, present(finding, direct_evidence(prepared, finding)))
     return prepared, finding, direct
 
@@ -94,9 +94,9 @@ def test_judging_runs_only_report(logs):
     assert one[1].selected == two[1].selected
     assert one[1].law == two[1].law
     assert one[2] == two[2]
-    assert one[1].candidates.keys() == two[1].candidates.keys()
-    for effects, candidate in one[1].candidates.items():
-        np.testing.assert_array_equal(candidate.solution.vector, two[1].candidates[effects].solution.vector)
+    assert one[1].values == two[1].values
+    np.testing.assert_array_equal(one[1].fit.vector, two[1].fit.vector)
+    np.testing.assert_array_equal(one[1].table.cross, two[1].table.cross)
     assert set(one[0].judging.run) == {1}
     np.testing.assert_array_equal(one[0].log.u_r, join(logs).u_r)  # judged under the commands that were sent
 

@@ -85,9 +85,7 @@ def test_the_right_effect_of_the_wrong_size_is_a_parameter():
     given, fitted = (neutral_vector(np.ones(10)) for _ in range(2))
     given[place], fitted[place] = 0.05, 0.10
     solution = SimpleNamespace(vector=fitted, places=[*range(10), place], covariance=1e-4 * np.eye(11))
-    finding = SimpleNamespace(
-        selected=("transport_delay",), candidates={("transport_delay",): SimpleNamespace(solution=solution)}
-    )
+    finding = SimpleNamespace(selected=("transport_delay",), fit=solution)
     prepared = SimpleNamespace(largest=90.0)
     last = compare_parameters(prepared, finding, given, ("transport_delay",))[-1]
     assert last.name == "transport_delay delay"
@@ -132,8 +130,7 @@ def test_a_model_that_knows_the_side_of_its_marker_is_compared_as_seen_from_ther
     given[PLACES["marker_offset", "ahead"]], given[PLACES["marker_offset", "left"]] = 0.02, 0.03
     places = free_places(("marker_offset",))
     solution = SimpleNamespace(vector=abreast_of_marker(given), places=places, covariance=1e-4 * np.eye(len(places)))
-    found = {("marker_offset",): SimpleNamespace(solution=solution)}
-    finding = SimpleNamespace(selected=("marker_offset",), candidates=found)
+    finding = SimpleNamespace(selected=("marker_offset",), fit=solution)
     rows = compare_parameters(SimpleNamespace(largest=2.0), finding, given, ("marker_offset",))
     np.testing.assert_allclose([row.nominal for row in rows], [row.refitted for row in rows], atol=1e-12)
     assert [row.name for row in rows[10:]] == ["marker_offset ahead", "marker_offset left"]

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from jaxident.diagnosis.causes.search import Solution
+from jaxident.diagnosis.causes.refit import Solution
 from jaxident.diagnosis.diagnose import compare_parameters
 from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.translate import effect_of, to_model
@@ -49,7 +49,7 @@ def test_a_limit_that_never_acts_is_none_of_the_model_and_has_no_size():
     prepared = SimpleNamespace(log=log, largest=1.0)
     model = to_model(prepared, vector, Law(1e-3, 5e-3), effects, None, solution)
     assert [effect.name for effect in model.effects] == ["turn_loss"]
-    finding = SimpleNamespace(candidates={effects: SimpleNamespace(solution=solution)}, selected=effects)
+    finding = SimpleNamespace(fit=solution, selected=effects)
     rows = compare_parameters(prepared, finding, vector, effects)
     assert all(np.isfinite(row.refitted) for row in rows)
     assert rows[-1].name == "turn_loss loss"

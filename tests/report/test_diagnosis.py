@@ -1,16 +1,12 @@
 """The page of a diagnosis, of one made up for each verdict."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
-from support.diagnoses import LARGEST, VERDICTS, made_up
+from support.diagnoses import LARGEST, VERDICTS, finding_of, made_up
 
-from jaxident.diagnosis.causes.candidates import Candidate
 from jaxident.diagnosis.diagnose import Parameter
 from jaxident.diagnosis.visible import smallest_sizes
 from jaxident.effects.catalogue import CATALOGUE
-from jaxident.effects.coordinates import free_places
 from jaxident.report import Figure, Table, render
 from jaxident.report.account import account_lines
 from jaxident.report.causes import BESIDE
@@ -149,8 +145,7 @@ def test_nothing_seen_is_a_page_too():
     nothing = np.full((3, 4, 3), np.nan)
     gap = found.gap._replace(errors=nothing, floor=np.nan, floor_interval=(np.nan, np.nan))
     account = found.account._replace(rows=[], windows=0)
-    finding = found.finding._replace(candidates={(): found.finding.candidates[()]})
-    page = diagnosis_page(found._replace(gap=gap, account=account, finding=finding, shrinks={}), "runs")
+    page = diagnosis_page(found._replace(gap=gap, account=account, finding=finding_of({}), shrinks={}), "runs")
     assert section(page, "How large the gap is").blocks == ["No stretch of the logs is left to judge by."]
     assert "No effect promised enough to be fitted." in section(page, "Which effect causes it").blocks
 
@@ -208,8 +203,7 @@ def test_words():
 @pytest.mark.parametrize(("effects", "told"), [(("marker_offset",), False), (("marker_offset", "turn_loss"), True)])
 def test_a_side_of_the_marker_that_nothing_tells_is_said(effects, told):
     found = made_up("effects")
-    best = Candidate(effects, SimpleNamespace(places=free_places(effects)), 500.0)
-    finding = found.finding._replace(candidates=found.finding.candidates | {effects: best}, selected=effects)
+    finding = finding_of({effects: 500.0}, effects)
     blocks = section(
         diagnosis_page(found._replace(finding=finding, selected=effects), "runs"), "Which effect causes it"
     ).blocks

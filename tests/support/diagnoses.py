@@ -3,13 +3,16 @@
 from typing import Any
 
 import numpy as np
+from support.tables import table_of
 
 from jaxident.diagnosis.account.account import account_of
 from jaxident.diagnosis.account.floor import Floor
 from jaxident.diagnosis.account.shrink import Shrink
 from jaxident.diagnosis.account.where import Place, Region
-from jaxident.diagnosis.causes.candidates import Candidate, Finding
 from jaxident.diagnosis.causes.corrector import Term
+from jaxident.diagnosis.causes.finding import Finding, Values
+from jaxident.diagnosis.causes.refit import Solution
+from jaxident.diagnosis.causes.unexplained import Rest
 from jaxident.diagnosis.diagnose import Diagnosis, Gap, Parameter
 from jaxident.diagnosis.frames import Frames
 from jaxident.diagnosis.noise.law import Law
@@ -17,7 +20,7 @@ from jaxident.diagnosis.prepare import Prepared
 from jaxident.diagnosis.replay import Replay
 from jaxident.diagnosis.verdict import Cause, Judgement
 from jaxident.effects.catalogue import SITES
-from jaxident.effects.coordinates import COORDINATES, NOMINAL
+from jaxident.effects.coordinates import COORDINATES, NOMINAL, free_places, neutral_vector
 from jaxident.robot.drive import Physical
 from jaxident.robot.model import Effect, Model
 
@@ -54,7 +57,7 @@ def made_up(verdict: str, *, given: bool = False) -> Diagnosis:
         {name: 1.7**k / 10.0 for k, name in enumerate(reversed(COORDINATES))},
         REPLAY, "Record a longer <run> & more.",
         model, _with_effects(model, selected), shrinks, Prepared(_NOTHING, LARGEST, *[_NOTHING] * 4, 30, 1.0,
-        Frames(_NOTHING, _NOTHING), _NOTHING, _LAW), _finding(selected, gap, verdict),
+        Frames(_NOTHING, _NOTHING), _NOTHING), _finding(selected, gap, verdict),
     )  # fmt: skip
 
 
@@ -119,16 +122,42 @@ def _place(gap: bool) -> Place:
     return Place(moved, excess, regions, table)
 
 
+def fit_of(effects: tuple[str, ...], size=0.0, deviation=0.01, cost=0.0) -> Solution:
+    """A fit with every coordinate of its effects `size` away from neutral, known to within `deviation`."""
+    vector, places = neutral_vector(np.ones(len(NOMINAL))), free_places(effects)
+    vector[places[len(NOMINAL) :]] += size
+    return Solution(vector, _NOTHING, places, _NOTHING, cost, deviation**2 * np.eye(len(places)), 1)
+
+
+def finding_of(worth: dict[tuple[str, ...], float], selected: tuple[str, ...] = (), terms=()) -> Finding:
+    """A search that ended at a set, by the log evidence of sets beyond that of none, which is also what they gain."""
+    whole = {frozenset(effects): value for effects, value in {(): 0.0, **worth}.items()}
+    own = whole[frozenset(selected)]
+    values: Values = {effects: value - own for effects, value in whole.items()}
+    table = _table(tuple(dict.fromkeys(name for effects in worth for name in effects)), selected, own)
+    return Finding(_NOTHING, _LAW, _LAW, fit_of((), cost=own), fit_of(selected, 0.1), selected, values,
+                   Rest(list(terms), _NOTHING, _LAW, 0.0), table)  # fmt: skip
+
+
 def _finding(selected: tuple[str, ...], gap: bool, verdict: str) -> Finding:
     size = 400.0 if gap else 3.0
-    gains: dict[tuple[str, ...], float] = {(): 0.0}
-    gains |= {(name,): size * max(value, 0.01) for name, value in SHRINKS.items()}
+    worth: dict[tuple[str, ...], float] = {(name,): size * max(value, 0.01) for name, value in SHRINKS.items()}
     if len(selected) == 2:
-        gains[selected] = 1.2 * size
-        gains["motor_lag", "quadratic_drag"] = 1.19 * size
-        gains["transport_delay", "marker_offset"] = 0.82 * size
-    candidates = {effects: Candidate(effects, _NOTHING, gain) for effects, gain in gains.items()}
+        worth[selected] = 1.2 * size
+        worth["motor_lag", "quadratic_drag"] = 1.19 * size
+        worth["transport_delay", "marker_offset"] = 0.82 * size
     terms: list[tuple[Any, float]] = [(Term("contact", "|v| w in the speed sideways"), 150.0)] * (
         verdict in ("partly", "unknown")
     )
-    return Finding(_NOTHING, _LAW, _LAW, _NOTHING, candidates, selected, terms)
+    return finding_of(worth, selected, terms)
+
+
+def _table(names: tuple[str, ...], selected: tuple[str, ...], gain: float):
+    """Answers of windows to some effects: the selected ones alone make up the residual; delay and lag look alike."""
+    rng = np.random.default_rng(5)
+    columns = rng.normal(size=(COUNT, 20, len(names))) / np.sqrt(20.0 * COUNT)
+    if {"motor_lag", "transport_delay"} <= set(names):
+        lag, delay = (names.index(name) for name in ("motor_lag", "transport_delay"))
+        columns[..., lag] = 0.99 * columns[..., delay] + 0.14 * columns[..., lag]
+    residual = columns[..., [names.index(name) for name in selected]].sum(axis=2) * np.sqrt(2.0 * abs(gain))
+    return table_of(columns, residual + rng.normal(size=residual.shape), names, scale=20.0, here=selected)

@@ -7,9 +7,6 @@ nominal parameters refitted on the runs that fit: to first order that is what th
 were switched off.
 """
 
-import itertools
-from collections.abc import Callable
-from math import factorial
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +14,7 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.diagnosis.account.floor import Floor
 from jaxident.diagnosis.account.judging import CHANNELS
+from jaxident.diagnosis.account.shapley import shapley
 from jaxident.diagnosis.account.shrink import HIGH, LOW, blocks
 
 CAMERA, START, SLIP, DISCOVERED, REST = "camera", "start", "slip", "discovered", "rest"
@@ -52,20 +50,6 @@ class Account(NamedTuple):
     def named(self) -> tuple[str, ...]:
         """The effects that have a row."""
         return tuple(row.part for row in self.rows if row.part not in (CAMERA, START, SLIP, DISCOVERED, REST))
-
-
-def shapley(players: tuple[str, ...], value: Callable[[frozenset[str]], Array]) -> dict[str, np.ndarray]:
-    """What each player takes away from `value`, an array for every set of them, averaged over all orders of joining."""
-    count = len(players)
-    found = {}
-    for player in players:
-        others, total = [name for name in players if name != player], 0.0
-        for size in range(count):
-            weight = factorial(size) * factorial(count - size - 1) / factorial(count)
-            for joined in itertools.combinations(others, size):
-                total = total + weight * (value(frozenset(joined)) - value(frozenset((*joined, player))))
-        found[player] = np.asarray(total)
-    return found
 
 
 def account_of(

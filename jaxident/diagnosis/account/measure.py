@@ -10,11 +10,11 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.account.account import Account, account_of
 from jaxident.diagnosis.account.floor import Floor, floor_of
 from jaxident.diagnosis.account.judging import Judged, judge_model
-from jaxident.diagnosis.account.models import Corrected, corrected_of, players_of, single, with_players, without
+from jaxident.diagnosis.account.models import Corrected, corrected_of, placebo_of, players_of, with_players, without
 from jaxident.diagnosis.account.shrink import HIGH, LOW, Shrink, interval, shrink_of
 from jaxident.diagnosis.account.slip_check import slip_seen
 from jaxident.diagnosis.account.where import Place, increments, locate
-from jaxident.diagnosis.causes.candidates import Finding
+from jaxident.diagnosis.causes.finding import Finding
 from jaxident.diagnosis.causes.unexplained import UNEXPLAINED
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.noise.doubt import Draws, draw_laws, sizes_by_memory
@@ -25,10 +25,6 @@ from jaxident.robot.model import Model
 
 REPLAYS = 500
 """Laws of noise, and robots, drawn as likely as the fit leaves them."""
-
-
-SHOWN = 4
-"""Effects alone, the best of them, whose shrink is told."""
 
 
 class Gap(NamedTuple):
@@ -106,7 +102,7 @@ def measure(prepared: Prepared, finding: Finding, given: Model | None, common, d
     unit = deviations(law) ** 2
     account = account_of(prepared.horizon, {k: j.error for k, j in judged.items()}, players, floor, unit, seed)
     errors = np.stack([one.error**2 / unit for one in (before, nobody, everybody)])
-    regular = bool(finding.terms) and law.slip is not None
+    regular = bool(finding.rest.terms) and law.slip is not None
     # terms left over are regular: so may be what the law calls slip, and then it is still to explain
     least = floor.steady if regular else None
     level = float(np.mean(floor.total / unit))
@@ -114,10 +110,9 @@ def measure(prepared: Prepared, finding: Finding, given: Model | None, common, d
     def shrink(model: Judged) -> Shrink:
         return shrink_of(errors[1], model.error**2 / unit, level, floor.draws, _wander(model, unit, seed), seed, least)
 
-    alone = sorted((c for e, c in finding.candidates.items() if len(e) == 1), key=lambda c: -c.gain)
-    told_alone = [*alone[:SHOWN], *alone[SHOWN:][-1:]]
-    shrinks = {c.effects[0]: shrink(judge_model(single(prepared, c, law), prepared)) for c in told_alone}
-    placebo = (alone[-1].effects[0], shrinks[alone[-1].effects[0]]) if alone else None
+    shrinks = {name: shrink(judged[frozenset({name})]) for name in players}
+    name, model = placebo_of(prepared, finding, law)
+    placebo = (name, shrink(judge_model(model, prepared)))
     kept = np.isfinite(errors).all(axis=(0, 2))
     given_level, refitted, after = (float(np.mean(own[kept])) if kept.any() else float("nan") for own in errors)
     low, high = (float(q) for q in np.quantile(floor.likely, [LOW, HIGH]))
@@ -143,7 +138,7 @@ def _corrected(prepared: Prepared, finding: Finding, direct: dict, seed: int) ->
 def _laws(finding: Finding, seed: int) -> tuple[Law, Draws]:
     """The law that the floor takes, and draws of laws as likely. Slip's memory is sized finely, unless something
     is left unexplained, which slip would take up."""
-    best, windows = finding.candidates[finding.selected].solution, finding.data.windows
+    best, windows = finding.fit, finding.data.windows
     fitted = respond(np.exp(best.vector[:2]), best.linear.residual, windows)
     given = sample(best.linear.residual, best.linear.starts, windows, fitted)
     unknown = finding.unexplained > UNEXPLAINED

@@ -1,14 +1,16 @@
 """The models that are judged: the corrected one, and it with some of its effects only, nominal parameters refitted."""
 
 import dataclasses
-import itertools
 from collections.abc import Collection, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxident.diagnosis.causes.candidates import Candidate, Finding
-from jaxident.diagnosis.causes.search import Data, refit
+from jaxident.diagnosis.account.shapley import joined_by
+from jaxident.diagnosis.causes.evidence import log_evidence
+from jaxident.diagnosis.causes.finding import Finding
+from jaxident.diagnosis.causes.refit import Data, refit
+from jaxident.diagnosis.causes.search import joining
 from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.prepare import Prepared
 from jaxident.diagnosis.translate import to_model
@@ -31,8 +33,8 @@ class Corrected(NamedTuple):
 
 def corrected_of(prepared: Prepared, finding: Finding, law: Law, direct: dict) -> Corrected:
     """The selected set as a model."""
-    fit = finding.candidates[finding.selected].solution
-    return Corrected(to_model(prepared, fit.vector, law, finding.selected, direct, fit), law, finding.selected, direct)
+    model = to_model(prepared, finding.fit.vector, law, finding.selected, direct, finding.fit)
+    return Corrected(model, law, finding.selected, direct)
 
 
 def players_of(corrected: Corrected, common: Collection[str]) -> tuple[str, ...]:
@@ -44,22 +46,19 @@ def players_of(corrected: Corrected, common: Collection[str]) -> tuple[str, ...]
 def with_players(
     prepared: Prepared, finding: Finding, corrected: Corrected, players: tuple[str, ...]
 ) -> Iterator[tuple[frozenset[str], Model]]:
-    """The corrected model with each set of its players: effects at the size that all were found with, and the nominal
-    parameters refitted on the rows that fit, as if the others were nowhere."""
+    """The corrected model with the sets of its players that the account asks for: effects at the size that all were
+    found with, and the nominal parameters refitted on the rows that fit, as if the others were nowhere."""
     fixed = {*corrected.selected, *corrected.direct} - set(players)
-    for count in range(len(players) + 1):
-        for joined in itertools.combinations(players, count):
-            if count == len(players):
-                yield frozenset(joined), corrected.model
-            else:
-                yield frozenset(joined), _refitted(prepared, finding, corrected, {*fixed, *joined})
+    for joined in joined_by(players):
+        whole = len(joined) == len(players)
+        yield joined, corrected.model if whole else _refitted(prepared, finding, corrected, {*fixed, *joined})
 
 
 def _refitted(prepared: Prepared, finding: Finding, corrected: Corrected, kept: set[str]) -> Model:
     """The model with some effects of the corrected one."""
     names = tuple(name for name in corrected.selected if name in kept)
     direct = {name: values for name, values in corrected.direct.items() if name in kept}
-    found = finding.candidates[corrected.selected].solution
+    found = finding.fit
     begin = found if 2 * len(names) >= len(corrected.selected) else finding.nominal
     vector = neutral_vector(begin.vector[: len(NOMINAL)])
     places = [place for (name, _), place in PLACES.items() if name in names]
@@ -78,9 +77,14 @@ def without(model: Model, effects: Collection[str]) -> Model:
     return dataclasses.replace(model, effects=tuple(e for e in model.effects if e.name not in effects))
 
 
-def single(prepared: Prepared, candidate: Candidate, law: Law) -> Model:
-    """A candidate as a model."""
-    return to_model(prepared, candidate.solution.vector, law, candidate.effects)
+def placebo_of(prepared: Prepared, finding: Finding, law: Law) -> tuple[str, Model]:
+    """The effect with a derivative that the search has least use for, and the model with it alone: what it shrinks is
+    chance."""
+    table, here = finding.table, [finding.table.here[name] for name in finding.selected]
+    idle = [k for k in joining(table, here) if table.options[k].point is None]
+    name = table.options[min(idle, key=lambda k: log_evidence(table, [*here, k]))].effect
+    fit = refit(finding.data, finding.nominal.vector, finding.nominal.starts, (name,))
+    return name, to_model(prepared, fit.vector, law, (name,))
 
 
 def as_model(prepared: Prepared, vector: np.ndarray, law: Law, effects: Collection[str], direct: dict) -> Model:

@@ -16,7 +16,7 @@ from jaxident.diagnosis.prepare import Prepared
 from jaxident.robot.model import Model
 from jaxident.robot.noise import Noise
 
-SURE = 3.0
+SURE = 1.5
 """Standard errors of the mean square by which the law must foretell too much, so that chance alone changes nothing."""
 ROUNDS, NEAR = 6, 0.02
 """Steps in which slip is taken back, and the part of the error to which they go."""

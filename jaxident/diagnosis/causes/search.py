@@ -1,137 +1,53 @@
-"""The best fit of the nominal robot with some effects, start states free: Levenberg-Marquardt on whitened windows."""
+"""The set of effects with the highest log evidence on a table: greedy forward, backward and by exchange."""
 
-from typing import Any, NamedTuple
+from collections.abc import Collection, Sequence
 
-import numpy as np
+from jaxident.diagnosis.causes.columns import Table
+from jaxident.diagnosis.causes.evidence import Worth, log_evidence, worth
 
-from jaxident.array_types import Array
-from jaxident.diagnosis.motion.linear import Linear, follow, gram, linearise, normal
-from jaxident.diagnosis.motion.windows import Windows
-from jaxident.effects.coordinates import NOMINAL, PLACES, STEPPED, free_places, limits, neutral_vector
-
-MOST_STEPS = 20
-"""Of one refit; what fits arrives in two to nine, what crawls is mostly an effect that is not there."""
-ENOUGH = 0.05
-"""Promised fall of -log p below which the search ends."""
-LONGEST = 0.5
-"""A step changes a rate by at most this much, as a logarithm."""
-PARTS = (1.0, 0.25, 0.0)
-"""Of the step of a window's start state that are tried."""
+MOST_EFFECTS = 6
+"""Effects in a set at most."""
+MOST_MOVES = 40
+"""Of one search; sets of five were found in six to nine."""
 
 
-class Data(NamedTuple):
-    """Windows and the whitener of their noise (windows, numbers, numbers)."""
-
-    windows: Windows
-    whitener: Any
-
-
-class Solution(NamedTuple):
-    """A fit: vector (SIZE,), starts (5, windows), the linearisation there in `places`, half the squares, and the
-    covariance of the free coordinates."""
-
-    vector: Any
-    starts: Any
-    places: list
-    linear: Linear
-    cost: float
-    covariance: Any
-    steps: int
-
-
-def refit(data: Data, vector: Array, starts: Array, effects: tuple[str, ...], hold: tuple = (), most=MOST_STEPS):
-    """The fit nearest downhill of a vector and starts with the coordinates of `effects` free, but those in `hold`.
-    Where the robot would run away there, effects begin at neutral."""
-    held = {PLACES[pair] for pair in {*hold, *STEPPED}}
-    places = [place for place in free_places(effects) if place not in held]
-    vector, starts = np.array(vector), np.array(starts)
-    low, high = (bound[places] for bound in limits())
-    linear, products, solve = _around(data, vector, starts, places)
-    if not np.all(np.isfinite(products)):  # another robot's sizes: with these one would run away
-        vector = neutral_vector(vector[: len(NOMINAL)])
-        linear, products, solve = _around(data, vector, starts, places)
-    cost, damping = 0.5 * products[-1, -1] + _taken(data, linear), 1e-4
-    for step_number in range(1, most + 1):
-        step, promised = _step(products, vector[places], low, high, damping)
-        if promised < ENOUGH and step_number > 1:
+def best_set(table: Table, begin: Sequence[int], without: Collection[str] = ()) -> list[int]:
+    """The options chosen, from some others on. Effects in `without` never join. An effect that is worth nothing beside
+    the others leaves first; then the best of all joinings and exchanges is taken."""
+    chosen, seen = list(begin), {frozenset(begin)}
+    for _ in range(MOST_MOVES):
+        own = {k: worth(table, chosen, k) for k in chosen}
+        weakest = min(own, key=lambda k: own[k].evidence, default=None)
+        if weakest is not None and own[weakest].evidence < 0.0:
+            chosen.remove(weakest)
+            seen.add(frozenset(chosen))
+            continue
+        better = _best_move(table, chosen, own, without)
+        if better is None or frozenset(better) in seen:
             break
-        new_vector = vector.copy()
-        new_vector[places] = np.clip(vector[places] + step, low, high)
-        step = new_vector[places] - vector[places]
-        moved = solve[:, :, -1] - solve[:, :, :-1] @ step
-        new_starts, new_cost = best_starts(data, new_vector, starts, moved.T)
-        there = _around(data, new_vector, new_starts, places) if new_cost < cost else None
-        if there is not None and np.all(np.isfinite(there[1])):  # beside a robot that runs away nothing can be told
-            gained, damping = cost - new_cost, max(0.2 * damping, 1e-7)
-            vector, starts, cost = new_vector, new_starts, new_cost
-            linear, products, solve = there
-            if gained < ENOUGH:
-                break
-        else:
-            damping *= 10.0
-            if damping > 1e6:
-                break
-    return Solution(vector, starts, places, linear, cost, _covariance(products), step_number)
+        chosen = better
+        seen.add(frozenset(chosen))
+    return chosen
 
 
-def _around(data: Data, vector: Array, starts: Array, places: list[int]) -> tuple[Linear, np.ndarray, np.ndarray]:
-    """The linearisation there, and its `_products`."""
-    linear = linearise(vector, starts, data.windows, places)
-    return linear, *_products(data, linear)
+def _best_move(table: Table, chosen: list[int], own: dict[int, Worth], without: Collection[str]) -> list[int] | None:
+    """The set with one option more or one exchanged that is worth most beyond what is chosen; None if nothing is."""
+    now, most, best = log_evidence(table, chosen), 0.0, None
+    bases = [(None, chosen)] if len(chosen) < MOST_EFFECTS else []
+    for old, base in [*bases, *((old, [k for k in chosen if k != old]) for old in chosen)]:
+        paid = 0.0 if old is None else own[old].evidence
+        for k in joining(table, base, without):
+            if k == old:
+                continue
+            gained = log_evidence(table, [*base, k]) - now
+            if gained > most:  # what windows say of it can only be less
+                gained = min(gained, worth(table, [*base, k], k).evidence - paid)
+            if gained > most:
+                most, best = gained, [*base, k]
+    return best
 
 
-def best_starts(data: Data, vector: Array, starts: Array, moved: Array) -> tuple[np.ndarray, float]:
-    """Starts (5, windows) moved in every window by the part of what is asked for (5, windows) that fits best, and half
-    the squares: one window that shows little of its start must not stop the others."""
-    lanes = starts + np.array(PARTS)[:, None, None] * moved
-    residual = follow(np.tile(vector, (len(lanes), 1)), lanes, data.windows)
-    with np.errstate(over="ignore", invalid="ignore"):  # a start may run away
-        squares = 0.5 * np.sum((data.whitener @ residual[..., None])[..., 0] ** 2, axis=2)
-    squares = np.where(np.isnan(squares), np.inf, squares)
-    best = np.argmin(squares, axis=0)
-    chosen = np.take_along_axis(lanes, best[None, None], axis=0)[0]
-    return chosen, float(np.sum(squares.min(axis=0)))
-
-
-def _taken(data: Data, linear: Linear) -> float:
-    """What start states would still take of the squares."""
-    residual = linear.residual
-    whole = 0.5 * float(np.sum((data.whitener @ residual[..., None]) ** 2))
-    rest = gram(data.whitener, residual[..., None], linear.starts)
-    return whole - 0.5 * float(np.sum(rest.products))
-
-
-def _products(data: Data, linear: Linear) -> tuple[np.ndarray, np.ndarray]:
-    """Summed products (n, n), the residual last, and what start states take in every window (windows, 5, n)."""
-    found = gram(data.whitener, np.concatenate([linear.slopes, linear.residual[..., None]], axis=2), linear.starts)
-    return found.products.sum(axis=0), found.solve
-
-
-def _step(products: Array, now: Array, low: Array, high: Array, damping: float) -> tuple[np.ndarray, float]:
-    """The damped step within the bounds, and the fall it promises; coordinates that a bound stops are held."""
-    free = list(range(len(now)))
-    step = np.zeros(len(now))
-    for _ in range(4):
-        if not free:
-            break
-        own, cross, scale = normal(products, free)
-        step[:] = 0.0
-        step[free] = np.linalg.solve(own + damping * np.eye(len(free)), cross) / scale
-        out = ((now <= low) & (step < 0.0)) | ((now >= high) & (step > 0.0))
-        if not out.any():
-            break
-        free = [k for k in free if not out[k]]
-    longest = np.max(np.abs(step[:2])) if len(step) > 1 else 0.0
-    if longest > LONGEST:
-        step = step * LONGEST / longest
-    step = np.clip(now + step, low, high) - now
-    return step, float(step @ products[:-1, -1] - 0.5 * step @ products[:-1, :-1] @ step)
-
-
-def _covariance(products: Array) -> np.ndarray:
-    """Covariance of the free coordinates; directions without information get a large finite variance."""
-    own, _, scale = normal(products, list(range(len(products) - 1)), ridge=0.0)
-    values, vectors = np.linalg.eigh(own)
-    rows = vectors / np.sqrt(np.maximum(values, 1e-12))
-    scale = np.maximum(scale, 1e-100)  # a coordinate without any answer: enormous, and finite
-    return rows @ rows.T / scale[:, None] / scale
+def joining(table: Table, chosen: Collection[int], without: Collection[str] = ()) -> list[int]:
+    """Options of effects that are not among some chosen, nor in `without`."""
+    names = {*table.effects(chosen), *without}
+    return [k for k, option in enumerate(table.options) if option.effect not in names]

@@ -7,8 +7,8 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.corrector import Term, library, pursue
+from jaxident.diagnosis.causes.refit import Data, Solution
 from jaxident.diagnosis.causes.rhythm import rhythms
-from jaxident.diagnosis.causes.search import Data, Solution
 from jaxident.diagnosis.motion.linear import gram, left_over, normal
 from jaxident.diagnosis.motion.responses import Responses
 from jaxident.diagnosis.noise.law import Law, white_whitener, whitener_of
@@ -19,19 +19,40 @@ UNEXPLAINED = 0.2
 """A gap is unknown where the corrector explains this share of it beyond the best set."""
 
 
-class Choice(NamedTuple):
-    """Terms with the fall of -log p that each brings; the residuals (windows, numbers) that they and the solution's
-    coordinates would leave; the restricted log-likelihood, all of them free."""
+class Rest(NamedTuple):
+    """What is predictable and in no named effect: terms with the fall of -log p that each brings, the answers of the
+    poses to them (windows, numbers, terms), the noise law beside them, and the restricted log-likelihood with all of
+    them free."""
 
-    found: list[tuple[Term, float]]
+    terms: list[tuple[Term, float]]
+    answers: Any
+    law: Law
+    log_likelihood: float
+
+    @property
+    def gain(self) -> float:
+        """Fall of -log p that all terms bring."""
+        return sum(gain for _, gain in self.terms)
+
+    @property
+    def largest(self) -> float:
+        """What the largest term brings."""
+        return max((gain for _, gain in self.terms), default=0.0)
+
+
+class Choice(NamedTuple):
+    """Places of terms and the fall of -log p that each brings; the residuals (windows, numbers) that they and the
+    solution's coordinates would leave; the restricted log-likelihood, all of them free."""
+
+    found: list[tuple[int, float]]
     left: Any
     log_likelihood: float
 
 
 def unexplained(
-    data: Data, solution: Solution, responses: Responses, law: Law, sized: bool
-) -> tuple[list[tuple[Term, float]], Law]:
-    """Terms that a solution leaves room for, each with the fall of -log p that it brings, and the law beside them.
+    data: Data, solution: Solution, responses: Responses, law: Law, sized: bool, memory_too: bool = True
+) -> Rest:
+    """What a solution leaves room for.
 
     A law sized beside a gap takes the gap for slip or a memory of the camera. So terms are first chosen as if the
     noise were white, the law is sized again at what they leave, and the terms that count then do so if they and that
@@ -41,11 +62,13 @@ def unexplained(
     choice = _choose(data, whitener_of(law, data.windows, responses), solution, terms, answers)
     if sized and law != Law(law.position, law.heading):
         left = _choose(data, white_whitener(law, data.windows), solution, terms, answers).left
-        again = size_noise(left, solution.linear.starts, data.windows, responses)
+        again = size_noise(left, solution.linear.starts, data.windows, responses, memory_too=memory_too)
         other = _choose(data, whitener_of(again, data.windows, responses), solution, terms, answers)
         if other.log_likelihood > choice.log_likelihood:
-            return other.found, again
-    return choice.found, law
+            choice, law = other, again
+    places = [place for place, _ in choice.found]
+    found = [(terms[place], gain) for place, gain in choice.found]
+    return Rest(found, answers[..., places], law, choice.log_likelihood)
 
 
 def _terms(data: Data, solution: Solution, responses: Responses) -> tuple[list[Term], np.ndarray]:
@@ -71,7 +94,7 @@ def _choose(data: Data, whitener: Array, solution: Solution, terms: list[Term], 
     own, cross, scale = normal(products, free)
     left = linear.residual - columns[..., free] @ (np.linalg.solve(own, cross) / scale)
     volume = _log_volume(whitener, linear.starts)
-    return Choice([(terms[place - len(base)], gain) for place, gain in found], left, volume - left_over(products, free))
+    return Choice([(place - len(base), gain) for place, gain in found], left, volume - left_over(products, free))
 
 
 def _log_volume(whitener: Array, starts: Array) -> float:

@@ -99,11 +99,6 @@ def without_starts(whitener: Array, columns: Array, starts: Array) -> tuple[np.n
     return columns - basis @ taken, np.linalg.solve(upper, taken) / scale.transpose(0, 2, 1)
 
 
-def explained(products: Array, base: list[int], more: list[int]) -> float:
-    """Fall of -log p when columns `more` join columns `base` in the fit of the last one; products (n, n)."""
-    return left_over(products, base) - left_over(products, [*base, *more])
-
-
 def left_over(products: Array, columns: list[int]) -> float:
     """Half the squares that a fit of the last column by some others leaves."""
     last = len(products) - 1

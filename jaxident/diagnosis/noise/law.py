@@ -24,17 +24,6 @@ class Law(NamedTuple):
     coloured_time: float | None = None
 
 
-def is_quieter(law: Law, other: Law, part: float) -> bool:
-    """Whether some kind of noise has at most a part of its power in another law; slip counts at low frequency."""
-    return any(old > 0.0 and new < part * old for new, old in zip(_powers(law), _powers(other), strict=True))
-
-
-def _powers(law: Law) -> list[float]:
-    slip, coloured = law.slip or (0.0, 0.0), law.coloured or (0.0, 0.0)
-    slow = [deviation**2 * (law.slip_time or 0.0) for deviation in slip]
-    return [law.position**2, law.heading**2, *slow, *(deviation**2 for deviation in coloured)]
-
-
 def less_slip(law: Law, factor: float) -> Law:
     """The law with a part of its slip's variances."""
     return law if law.slip is None else law._replace(slip=tuple(d * factor**0.5 for d in law.slip))

@@ -58,10 +58,17 @@ class Sized(NamedTuple):
     log_likelihood: float
 
 
-def size_noise(residual: Array, starts: Array, windows: Windows, responses: Responses, worth: float = WORTH) -> Law:
+def size_noise(
+    residual: Array,
+    starts: Array,
+    windows: Windows,
+    responses: Responses,
+    worth: float = WORTH,
+    memory_too: bool = True,
+) -> Law:
     """The likeliest law: white, with slip, with a camera memory, each only where it is worth its terms; from residuals
     (windows, numbers) and derivatives by start states (windows, numbers, 5). worth: the gain for which slip is
-    believed."""
+    believed. memory_too: whether the camera may have a memory."""
     given = sample(residual, starts, windows, responses)
     begin = first_law(windows)
     base = size_one(given, begin, None, None)
@@ -69,6 +76,8 @@ def size_noise(residual: Array, starts: Array, windows: Windows, responses: Resp
     slip = max(slips, key=_likelihood)
     by_slip = slip.log_likelihood - base.log_likelihood
     base, by_slip = (slip, by_slip) if by_slip > worth else (base, 0.0)
+    if not memory_too:
+        return base.law
     needed = base.log_likelihood + MEMORY_WORTH + REST * by_slip
     memories = [size_one(given, begin, None, time, rival=needed) for time in CAMERA_TIMES]
     memory = max(memories, key=_likelihood)

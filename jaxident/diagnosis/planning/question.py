@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.scores import seeded
+from jaxident.diagnosis.causes.points import seeded
 from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.prepare import BURN, horizon_rows
 from jaxident.diagnosis.translate import scaled

@@ -1,0 +1,188 @@
+"""The whole search on a small robot whose effects are known: what it names, exchanges, lets go and tells of others."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from support.small_robot import VECTOR, nominal_fit, robot_with, windows_of
+
+from jaxident.diagnosis.causes.columns import tabulate
+from jaxident.diagnosis.causes.evidence import evidence_of, log_evidence
+from jaxident.diagnosis.causes.finding import finding_of
+from jaxident.diagnosis.causes.moves import ARRIVED, better, fit_options, look_alikes, stands
+from jaxident.diagnosis.causes.refit import refit
+from jaxident.diagnosis.causes.rounds import search, settle
+from jaxident.diagnosis.noise.law import first_law
+from jaxident.effects.coordinates import NOMINAL, PLACES
+
+DELAY, LAG, LOSS = ("transport_delay", "delay"), ("motor_lag", "time_constant"), ("turn_loss", "loss")
+SAG, AHEAD = ("supply_sag", "resistance"), ("marker_offset", "ahead")
+SLOPE = {("slope", "x"): 0.2, ("slope", "y"): -0.1}
+
+
+def found_on(windows, nominal, without=()):
+    """The finding of a search on windows that need no log behind them."""
+    return finding_of(SimpleNamespace(nominal=nominal), search(windows, nominal, without), without)
+
+
+def found_of(sizes, without=(), seed=0):
+    """The finding of a robot with some effects."""
+    windows = windows_of(robot_with(sizes), seed)
+    return found_on(windows, nominal_fit(windows)[1], without)
+
+
+def fitted(windows, effects, begin):
+    """Data and fit of a robot with effects that begin somewhere."""
+    data, nominal = nominal_fit(windows)
+    vector = nominal.vector.copy()
+    for pair, value in begin.items():
+        vector[PLACES[pair]] = value
+    return data, refit(data, vector, nominal.starts, effects)
+
+
+@pytest.fixture(scope="module")
+def pair():
+    """The finding of a robot with a delay and a loss in turns."""
+    return found_of({DELAY: 0.08, LOSS: 0.3})
+
+
+@pytest.fixture(scope="module")
+def lagging():
+    """Windows of a robot with a lag."""
+    return windows_of(robot_with({LAG: 0.1}))
+
+
+def is_sized(finding, sizes):
+    """Whether coordinates are within five of their standard deviations of what was put in."""
+    for pair, value in sizes.items():
+        own = finding.fit.places.index(PLACES[pair])
+        deviation = finding.fit.covariance[own, own] ** 0.5
+        assert finding.fit.vector[PLACES[pair]] == pytest.approx(value, abs=5.0 * deviation), pair
+
+
+def test_two_effects_are_named_and_nothing_else(pair):
+    assert set(pair.selected) == {"transport_delay", "turn_loss"}
+    is_sized(pair, {DELAY: 0.08, LOSS: 0.3})
+    assert pair.rest.terms == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("sizes", [
+    {LAG: 0.06, **SLOPE},
+    {DELAY: 0.08, LOSS: 0.3},
+    {SAG: 0.2, AHEAD: 0.03},
+    {("backlash", "right"): 0.06, ("backlash", "left"): 0.06, ("lateral_slip", "slip"): 0.05},
+    {("input_saturation", "level"): 0.7, ("quadratic_drag", "along"): 1.0, ("quadratic_drag", "heading"): 0.2},
+    {("stiction", "right"): 0.15, ("stiction", "left"): 0.15, **SLOPE},
+], ids=lambda sizes: " and ".join(dict.fromkeys(name for name, _ in sizes)))  # fmt: skip
+@pytest.mark.parametrize("seed", range(1, 3))
+def test_pairs_of_many_kinds_are_named_and_nothing_else(sizes, seed):
+    finding = found_of(sizes, seed=seed)
+    assert set(finding.selected) == {name for name, _ in sizes}
+    is_sized(finding, sizes)
+
+
+def test_of_a_robot_without_effects_none_is_named():
+    finding = found_of({})
+    assert finding.selected == ()
+    assert finding.values[frozenset()] == 0.0
+    assert max(value for effects, value in finding.values.items() if effects) < 0.0
+    assert finding.gain == 0.0
+    np.testing.assert_array_equal(finding.fit.vector[len(NOMINAL) :], VECTOR[len(NOMINAL) :])
+
+
+@pytest.mark.slow
+def test_of_ten_robots_without_effects_hardly_one_has_an_effect_named():
+    """By their prior odds alone less than one in twenty would; none or one of ten is 91 % likely even then."""
+    assert sum(bool(found_of({}, seed=seed).selected) for seed in range(1, 11)) <= 1
+
+
+def test_values_are_held_against_the_selected_set(pair):
+    whole = frozenset(pair.selected)
+    assert pair.values[whole] == 0.0
+    assert all(value <= 0.0 for value in pair.values.values())
+    assert pair.values[frozenset()] < -1000.0
+    for name in pair.selected:
+        assert pair.values[whole - {name}] < -100.0
+    assert all(len(effects ^ whole) <= 2 for effects in pair.values if effects)
+    assert len({effects for effects in pair.values if effects > whole}) > 15, "every other effect beside it"
+
+
+def test_entrants_are_the_selected_effects_then_what_is_next(pair):
+    found = pair.entrants(("motor_lag",))
+    own = {each.effect: each for each in found if not each.instead}
+    assert set(pair.selected) < set(own)
+    assert min(own[name].evidence for name in pair.selected) > 100.0
+    assert max(each.evidence for name, each in own.items() if name not in pair.selected) < 0.0
+    assert {(each.effect, each.instead) for each in found if each.instead} == {
+        ("motor_lag", name) for name in pair.selected
+    }
+
+
+@pytest.mark.slow
+def test_an_effect_that_the_catalogue_lacks_is_in_no_set(lagging):
+    finding = found_on(lagging, nominal_fit(lagging)[1], ("motor_lag",))
+    assert "motor_lag" not in finding.selected
+    assert not any("motor_lag" in effects for effects in finding.values)
+    assert finding.unexplained > 0.0 or finding.selected, "something stands in"
+
+
+def test_a_look_alike_is_exchanged_for_what_it_looks_like(lagging):
+    data, fit = fitted(lagging, ("transport_delay",), {DELAY: 0.1})
+    now, tried = stands(fit, ("transport_delay",)), {frozenset({"transport_delay"}): 0.0}
+    table = tabulate(data, fit, now.effects)
+    found = better(data, table, now, tried)
+    assert "motor_lag" in look_alikes("transport_delay")
+    assert found.effects == ("motor_lag",)
+    assert found.evidence > now.evidence + ARRIVED
+    assert tried[frozenset({"motor_lag"})] == pytest.approx(found.evidence - now.evidence)
+    assert found.fit.vector[PLACES[LAG]] == pytest.approx(0.1, abs=1e-3)
+    assert found.fit.vector[PLACES[DELAY]] == 0.0
+
+
+def test_a_set_that_was_refitted_is_not_tried_again_nor_one_that_the_catalogue_lacks(lagging):
+    data, fit = fitted(lagging, ("transport_delay",), {DELAY: 0.1})
+    now = stands(fit, ("transport_delay",))
+    table = tabulate(data, fit, now.effects)
+    for known, without in (({frozenset({"motor_lag"}): -1.0}, ()), ({}, ("motor_lag",))):
+        tried = {frozenset({"transport_delay"}): 0.0, **known}
+        found = better(data, table, now, tried, without)
+        assert found is None or "motor_lag" not in found.effects
+        assert {key for key in tried if "motor_lag" in key} == set(known)
+
+
+@pytest.mark.parametrize("begin", [{DELAY: 0.1}, SLOPE, {**SLOPE, SAG: 0.1}])
+def test_a_search_that_begins_with_wrong_effects_ends_with_the_right_one(lagging, begin):
+    effects = tuple(dict.fromkeys(name for name, _ in begin))
+    _, fit = fitted(lagging, effects, begin)
+    state = settle(lagging, stands(fit, effects), first_law(lagging), None)
+    assert state.now.effects == ("motor_lag",)
+    assert state.tried[frozenset({"motor_lag"})] == 0.0
+    assert state.table.here.keys() == {"motor_lag"}
+
+
+def test_the_evidence_of_a_refit_is_what_the_table_promises():
+    """Of small effects, about which everything is linear: within a fifth of a unit of some tens."""
+    for sizes in ({LOSS: 0.1}, {("slope", "x"): 0.006, ("slope", "y"): -0.004}):
+        windows = windows_of(robot_with(sizes))
+        data, nominal = nominal_fit(windows)
+        table, now = tabulate(data, nominal, ()), stands(nominal, ())
+        (name,) = {name for name, _ in sizes}
+        option = next(k for k, one in enumerate(table.options) if one.effect == name)
+        found = fit_options(data, table, now, [option])
+        promised = log_evidence(table, [option])
+        assert promised > 10.0
+        assert found.evidence - now.evidence == pytest.approx(promised, abs=0.2)
+
+
+def test_a_fit_without_effects_has_the_evidence_of_its_squares_alone(lagging):
+    _, nominal = nominal_fit(lagging)
+    assert evidence_of(nominal, 0) == -nominal.cost
+
+
+def test_a_refit_that_is_far_behind_is_given_up(lagging):
+    data, nominal = nominal_fit(lagging)
+    table, now = tabulate(data, nominal, ()), stands(nominal, ())
+    option = next(k for k, one in enumerate(table.options) if one.effect == "motor_lag")
+    assert fit_options(data, table, now, [option], behind=-nominal.cost) is None
+    assert fit_options(data, table, now, [option], behind=0.0) is not None

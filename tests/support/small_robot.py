@@ -1,0 +1,50 @@
+"""A small simulated robot whose windows are cheap to follow: what searches are tried with."""
+
+import numpy as np
+
+from jaxident.diagnosis.causes.refit import Data, Solution, refit
+from jaxident.diagnosis.motion.linear import follow
+from jaxident.diagnosis.motion.windows import Windows, cut
+from jaxident.diagnosis.noise.law import Law, white_whitener
+from jaxident.effects.coordinates import PLACES, neutral_vector, nominal_vector
+from jaxident.log import join, make_log
+from jaxident.robot.drive import Physical
+
+ROWS, RUNS, STEP = 320, 3, 0.03
+LAW = Law(2e-4, 2e-3)
+VECTOR = neutral_vector(
+    nominal_vector(Physical(np.array([3.0, 5.0]), np.array([[0.5, 0.4], [9.0, -8.5]])), np.array([0.1, 0.12]))
+)
+
+
+def robot_with(sizes) -> np.ndarray:
+    """Coordinates of the robot with some of its effects, {(effect, coordinate): value}."""
+    vector = VECTOR.copy()
+    for pair, value in sizes.items():
+        vector[PLACES[pair]] = value
+    return vector
+
+
+def windows_of(vector, seed=0, late=0, law=LAW) -> Windows:
+    """Windows of noisy poses that the follower itself makes from whole runs, so that a fit of its form is exact; every
+    fifth change of the command `late` rows."""
+    rng = np.random.default_rng(seed)
+    runs, t = [], np.arange(ROWS) * STEP
+    for _ in range(RUNS):
+        u = np.repeat(np.round(rng.uniform(-1.0, 1.0, (ROWS // 10, 2)), 3), 10, axis=0)
+        runs.append(make_log(t, u[:, 0], u[:, 1], 0.0 * t, 0.0 * t, 0.0 * t))
+    whole = cut(join(runs), ROWS)
+    for row in range(50, ROWS, 50):
+        whole.command[row : row + late] = whole.command[row - 1]
+    path = -follow(vector[None], np.zeros((1, 5, RUNS)), whole)[0].reshape(RUNS, ROWS, 3)
+    path = path + rng.normal(size=path.shape) * [law.position, law.position, law.heading]
+    poses = [log._replace(x=p[:, 0], y=p[:, 1], theta=p[:, 2]) for log, p in zip(runs, path, strict=True)]
+    return cut(join(poses), 40)
+
+
+def nominal_fit(windows) -> tuple[Data, Solution]:
+    """The fit without effects under white noise as large as it was made, and its data."""
+    data = Data(windows, white_whitener(LAW, windows))
+    begin = np.zeros((5, len(windows.run)))
+    begin[:3] = windows.pose[0].T
+    return data, refit(data, VECTOR, begin, ())
