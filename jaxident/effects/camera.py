@@ -124,7 +124,7 @@ RECORDS = (
         parameters=(Parameter("ahead", "m", 0.0, (-0.1, 0.1), 0.02), Parameter("left", "m", 0.0, (-0.1, 0.1), 0.01)),
         channels=(ALONG, LATERAL),
         act=marker_offset, rank=-2, confused_with=("lateral_slip",),
-        search=Search((signed("ahead", 0.3), signed("left", 0.3, silent=True, unseen=True)), rigid=True),
+        search=Search((signed("ahead", 0.3), signed("left", 0.3, silent=True, unseen=True))),
     ),
     EffectRecord(
         name="heading_offset", site="camera", stage="optics",
@@ -133,7 +133,7 @@ RECORDS = (
         source="mounting of the marker; Censi et al. 2013, IEEE TRO 29",
         parameters=(Parameter("offset", "rad", 0.0, (-0.2, 0.2), 0.05),), channels=(LATERAL,),
         act=heading_offset, rank=-2,
-        search=Search((signed("offset", 0.6),), rigid=True),
+        search=Search((signed("offset", 0.6),)),
     ),
     EffectRecord(
         name="camera_scale", site="camera", stage="optics",

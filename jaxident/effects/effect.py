@@ -142,7 +142,7 @@ class Search(NamedTuple):
     transform: where the coordinates are not the parameters. seeds(duration): points {coordinate: value} from which it
     is looked for in a session of some duration [s]. Without seeds, or with a first one that is empty, the derivative at
     neutral says where to begin; further seeds then stand for other forms of the effect. on_speeds: it acts on the
-    speeds of axle or wheels. rigid: geometry leaves it no other form, so that what it leaves over is another effect.
+    speeds of axle or wheels.
     all_or_nothing: its gain does not grow with its size.
     """
 
@@ -151,7 +151,6 @@ class Search(NamedTuple):
     seeds: Callable[[float], list[Seed]] | None = None
     suggested: Suggested | None = None
     on_speeds: bool = False
-    rigid: bool = False
     all_or_nothing: bool = False
 
     @property

@@ -17,7 +17,8 @@ from jaxident.robot.model import Model
 from jaxident.robot.noise import Noise
 
 SURE = 1.5
-"""Standard errors of the mean square by which the law must foretell too much, so that chance alone changes nothing."""
+"""Standard errors of the mean square by which the law must foretell too much; chance alone does in one case of 15. At
+1.5 as at 3, the floor's interval lies above the error on 1 of 38 simulated robots."""
 ROUNDS, NEAR = 6, 0.02
 """Steps in which slip is taken back, and the part of the error to which they go."""
 

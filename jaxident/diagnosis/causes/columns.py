@@ -30,8 +30,8 @@ from jaxident.effects.coordinates import (
 )
 
 AMPLITUDE = 1.5
-"""Prior standard deviation of how many times a point of a grid an effect is: grids have steps of a factor of two or
-less."""
+"""Prior standard deviation of the multiple of a grid's point that an effect is. Grids have steps of a factor of two or
+less. No other value was tried."""
 NEUTRAL = neutral_vector(np.zeros(len(NOMINAL)))
 LOW, _ = limits()
 

@@ -23,7 +23,7 @@ from jaxident.diagnosis.causes.refit import Solution
 from jaxident.effects.coordinates import NOMINAL, PLACES, SHAPES, SMOOTH, limits, sizes
 
 CHANCE = float(np.log(0.03 / 0.97))
-"""Prior log odds that an effect takes part: of the catalogue's 26 a real robot shows one or two clearly."""
+"""Prior log odds that an effect takes part: of some thirty in the catalogue a real robot shows one or two clearly."""
 WRONG = -1e9
 """Log evidence of what cannot be: an effect whose sign would have to be the other one, or a fit that has not
 arrived."""

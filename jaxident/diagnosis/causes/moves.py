@@ -23,7 +23,8 @@ HOPELESS = 0.7
 ARRIVED = 1.0
 """Log evidence by which another fit must be better."""
 NEAREST, JOINING = 2, 2
-"""Effects tried in place of each one of the set, the best by the table beside its look-alikes; and beside the set."""
+"""Effects tried in place of each one of the set, the best by the table besides its look-alikes; and beside the set. All
+numbers above bound the cost; no others were tried."""
 
 
 class Move(NamedTuple):

@@ -16,7 +16,8 @@ from jaxident.diagnosis.noise.sizing import size_noise
 
 SIDES = ("right", "left")
 UNEXPLAINED = 0.2
-"""A gap is unknown where the corrector explains this share of it beyond the best set."""
+"""Share of all that is explained which terms in no catalogue bring, from which on slip is not sized more finely and
+channels are those of the error: it may be slip for want of a name."""
 
 
 class Rest(NamedTuple):
