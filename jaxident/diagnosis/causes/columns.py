@@ -1,10 +1,10 @@
 """How the poses of all windows answer to every effect, linear about one fit: the table of a search.
 
 An effect takes part by one of its options: by the slopes of its coordinates; or, where it has no derivative at neutral
-or another form of itself, by the difference that a point of a grid makes. Start states of windows and the nominal
-parameters have flat priors and are eliminated. What is regular and in no catalogue is first freed of all that the
-catalogue can do (orthogonal discrepancy: Plumlee 2017, J. Amer. Statist. Assoc. 112). Then it is taken away. So it
-never competes with a name, and what it leaves says how windows agree on a name.
+or another form of itself, by the difference that a point of a grid makes. Start states of windows have flat priors,
+the nominal parameters that of `alike`; both are eliminated. What is regular and in no catalogue is first freed of all
+that the catalogue can do (orthogonal discrepancy: Plumlee 2017, J. Amer. Statist. Assoc. 112). Then it is taken away.
+So it never competes with a name, and what it leaves says how windows agree on a name.
 """
 
 from collections.abc import Collection
@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
+from jaxident.diagnosis.causes.alike import with_prior
 from jaxident.diagnosis.causes.points import differences, points_of, seeded
 from jaxident.diagnosis.causes.refit import Data, Solution
 from jaxident.diagnosis.motion.linear import Linear, gram, linearise
@@ -95,7 +96,7 @@ def tabulate(
     products = gram(data.whitener, whole, linear.starts).products
     cross = products[:, :-1, -1] + products[:, :-1, base.shape[2] : -1] @ [column.value for column in columns]
     scale = np.array([column.scale for column in columns])
-    products, cross = _eliminated(products[:, :-1, :-1], cross, base.shape[2] if free else len(NOMINAL))
+    products, cross = _eliminated(fit, products[:, :-1, :-1], cross, base.shape[2] if free else len(NOMINAL))
     if not free:
         products, cross = _without_rest(products, cross, scale)
     return Table(options, here, products, cross, scale, np.array([column.positive for column in columns]))
@@ -150,9 +151,12 @@ def _answers(data: Data, fit: Solution, columns: list[_Column]) -> tuple[np.ndar
     return np.where(np.isfinite(answers), answers, 0.0), linear  # a robot that runs away answers nothing
 
 
-def _eliminated(products: Array, cross: Array, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Products and cross products of the later columns, the first `count` free."""
-    whole, right = products.sum(axis=0), cross.sum(axis=0)
+def _eliminated(fit: Solution, products: Array, cross: Array, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Products and cross products of the later columns, the first `count` free but for the nominal robot's prior."""
+    summed = np.zeros((len(products[0]) + 1, len(products[0]) + 1))
+    summed[:-1, :-1], summed[:-1, -1] = products.sum(axis=0), cross.sum(axis=0)
+    summed = with_prior(summed, fit.vector)
+    whole, right = summed[:-1, :-1], summed[:-1, -1]
     length = np.sqrt(np.maximum(np.diagonal(whole)[:count], 1e-300))
     own = whole[:count, :count] / length[:, None] / length + 1e-10 * np.eye(count)
     inverse = np.linalg.inv(own) / length[:, None] / length

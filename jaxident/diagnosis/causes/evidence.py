@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from jaxident.array_types import Array
 from jaxident.diagnosis.causes.columns import LOW, NEUTRAL, Table
 from jaxident.diagnosis.causes.refit import Solution
 from jaxident.effects.coordinates import NOMINAL, PLACES, SHAPES, SMOOTH, limits, sizes
@@ -39,40 +40,55 @@ class Worth(NamedTuple):
 
 
 class _Posterior(NamedTuple):
-    """Columns that are free, in units of their scale: mean (n,) and precision (n, n)."""
+    """Columns that are free, in units of their scale (n,): mean (n,) and precision (n, n)."""
 
     columns: list[int]
+    scale: Any
     mean: Any
     precision: Any
 
 
 def _posterior(table: Table, chosen: Sequence[int]) -> _Posterior:
-    """Of all columns of some options; those that would have the wrong sign stay at zero."""
+    """Of all columns of some options; those that would have the wrong sign stay at zero.
+
+    A size beyond its prior's deviation widens that deviation to itself, once: a robot of another scale is no surprise.
+    A Create's turn loss is twenty deviations of the catalogue's, which would cost 200 units of log evidence.
+    """
     columns = [column for k in chosen for column in table.options[k].columns]
-    scale = table.scale[columns]
     whole = np.einsum("wij->ij", table.products[:, columns][:, :, columns])
-    precision = whole * scale[:, None] * scale + np.eye(len(columns))
-    right, free = table.cross[:, columns].sum(axis=0) * scale, np.arange(len(columns))
+    right, scale = table.cross[:, columns].sum(axis=0), table.scale[columns]
+    free = np.arange(len(columns))
+    for widen in (True, False):
+        precision, mean, free = _positive_mean(whole, right, scale, free, table.positive[columns])
+        if widen:
+            scale = scale.copy()
+            scale[free] *= np.maximum(1.0, np.abs(mean))
+    return _Posterior([columns[k] for k in free], scale[free], mean, precision)
+
+
+def _positive_mean(whole: Array, right: Array, scale: Array, free: Array, positive: Array) -> tuple[Any, Any, Any]:
+    """Precision and mean of the free columns, those left out that would have the wrong sign; and which are free."""
+    precision = whole * scale[:, None] * scale + np.eye(len(scale))
     while len(free):
-        mean = np.linalg.solve(precision[np.ix_(free, free)], right[free])
-        wrong = (mean < 0.0) & table.positive[columns][free]
+        mean = np.linalg.solve(precision[np.ix_(free, free)], right[free] * scale[free])
+        wrong = (mean < 0.0) & positive[free]
         if not wrong.any():
-            return _Posterior([columns[k] for k in free], mean, precision[np.ix_(free, free)])
+            return precision[np.ix_(free, free)], mean, free
         free = free[~wrong]
-    return _Posterior([], np.zeros(0), np.zeros((0, 0)))
+    return np.zeros((0, 0)), np.zeros(0), free
 
 
 def posterior_mean(table: Table, chosen: Sequence[int]) -> dict[int, float]:
     """What each column of some options is multiplied with, those left out that would have the wrong sign."""
-    columns, mean, _ = _posterior(table, chosen)
-    return dict(zip(columns, (mean * table.scale[columns]).tolist(), strict=True))
+    columns, scale, mean, _ = _posterior(table, chosen)
+    return dict(zip(columns, (mean * scale).tolist(), strict=True))
 
 
 def log_evidence(table: Table, chosen: Sequence[int]) -> float:
     """Of some options together, less that of none, the model taken for true."""
     if not chosen:
         return 0.0
-    columns, mean, precision = _posterior(table, chosen)
+    columns, _, mean, precision = _posterior(table, chosen)
     if not columns:
         return WRONG
     fall = 0.5 * float(mean @ precision @ mean)
@@ -82,11 +98,11 @@ def log_evidence(table: Table, chosen: Sequence[int]) -> float:
 
 def worth(table: Table, chosen: Sequence[int], option: int) -> Worth:
     """What one of some options is worth beside the others."""
-    columns, mean, precision = _posterior(table, chosen)
+    columns, scale, mean, precision = _posterior(table, chosen)
     own = [columns.index(column) for column in table.options[option].columns if column in columns]
     if not own:
         return Worth(0.0, WRONG)
-    scale, windows = table.scale[columns], len(table.cross)
+    windows = len(table.cross)
     scores = table.cross[:, columns] - table.products[:, columns][:, :, columns] @ (mean * scale)
     scores = scores * scale
     covariance = np.linalg.inv(precision)
@@ -109,11 +125,12 @@ def evidence_of(fit: Solution, count: int) -> float:
     places = [fit.places[k] for k in free]
     if _stopped(fit, places):
         return WRONG
-    scale = sizes()[places]
-    precision = np.linalg.inv(fit.covariance[np.ix_(free, free)]) * scale[:, None] * scale + np.eye(len(free))
     # a limit has no distance from neutral, and what only shapes an effect no neutral value
     measured = [_PLACE_NAMES[place] not in SHAPES and _PLACE_NAMES[place][0] in SMOOTH for place in places]
-    size = np.where(measured, fit.vector[places] - NEUTRAL[places], 0.0) / scale
+    size = np.where(measured, fit.vector[places] - NEUTRAL[places], 0.0)
+    scale = np.maximum(sizes()[places], np.abs(size))  # as in `_posterior`
+    size = size / scale
+    precision = np.linalg.inv(fit.covariance[np.ix_(free, free)]) * scale[:, None] * scale + np.eye(len(free))
     positive = int(np.sum(LOW[places] == NEUTRAL[places]))
     room = 0.5 * float(np.linalg.slogdet(precision)[1]) + 0.5 * float(size @ size) - np.log(2.0) * positive
     return -fit.cost - room + CHANCE * count

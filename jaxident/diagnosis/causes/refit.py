@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
+from jaxident.diagnosis.causes.alike import unlikeliness, with_prior
 from jaxident.diagnosis.motion.linear import Linear, follow, gram, linearise, normal
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.coordinates import NOMINAL, PLACES, STEPPED, free_places, limits, neutral_vector
@@ -27,8 +28,8 @@ class Data(NamedTuple):
 
 
 class Solution(NamedTuple):
-    """A fit: vector (SIZE,), starts (5, windows), the linearisation there in `places`, half the squares, and the
-    covariance of the free coordinates."""
+    """A fit: vector (SIZE,), starts (5, windows), the linearisation there in `places`, half the squares, the prior's
+    among them, and the covariance of the free coordinates."""
 
     vector: Any
     starts: Any
@@ -60,6 +61,7 @@ def refit(data: Data, vector: Array, starts: Array, effects: tuple[str, ...], ho
         step = new_vector[places] - vector[places]
         moved = solve[:, :, -1] - solve[:, :, :-1] @ step
         new_starts, new_cost = best_starts(data, new_vector, starts, moved.T)
+        new_cost += unlikeliness(new_vector)
         there = _around(data, new_vector, new_starts, places) if new_cost < cost else None
         if there is not None and np.all(np.isfinite(there[1])):  # beside a robot that runs away nothing can be told
             gained, damping = cost - new_cost, max(0.2 * damping, 1e-7)
@@ -75,9 +77,11 @@ def refit(data: Data, vector: Array, starts: Array, effects: tuple[str, ...], ho
 
 
 def _around(data: Data, vector: Array, starts: Array, places: list[int]) -> tuple[Linear, np.ndarray, np.ndarray]:
-    """The linearisation there, and its `_products`."""
+    """The linearisation there; summed products (n, n) with the prior's, the residual last; and what start states take
+    in every window (windows, 5, n)."""
     linear = linearise(vector, starts, data.windows, places)
-    return linear, *_products(data, linear)
+    found = gram(data.whitener, np.concatenate([linear.slopes, linear.residual[..., None]], axis=2), linear.starts)
+    return linear, with_prior(found.products.sum(axis=0), vector), found.solve
 
 
 def best_starts(data: Data, vector: Array, starts: Array, moved: Array) -> tuple[np.ndarray, float]:
@@ -99,12 +103,6 @@ def _taken(data: Data, linear: Linear) -> float:
     whole = 0.5 * float(np.sum((data.whitener @ residual[..., None]) ** 2))
     rest = gram(data.whitener, residual[..., None], linear.starts)
     return whole - 0.5 * float(np.sum(rest.products))
-
-
-def _products(data: Data, linear: Linear) -> tuple[np.ndarray, np.ndarray]:
-    """Summed products (n, n), the residual last, and what start states take in every window (windows, 5, n)."""
-    found = gram(data.whitener, np.concatenate([linear.slopes, linear.residual[..., None]], axis=2), linear.starts)
-    return found.products.sum(axis=0), found.solve
 
 
 def _step(products: Array, now: Array, low: Array, high: Array, damping: float) -> tuple[np.ndarray, float]:

@@ -6,7 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.corrector import Term, library, pursue
+from jaxident.diagnosis.causes.alike import with_prior
+from jaxident.diagnosis.causes.corrector import WORTH, Term, library, pursue
 from jaxident.diagnosis.causes.refit import Data, Solution
 from jaxident.diagnosis.causes.rhythm import rhythms
 from jaxident.diagnosis.motion.linear import gram, left_over, normal
@@ -88,14 +89,36 @@ def _choose(data: Data, whitener: Array, solution: Solution, terms: list[Term], 
     """The terms that count under a whitener."""
     linear, base = solution.linear, list(range(len(solution.places)))
     columns = np.concatenate([linear.slopes, answers, linear.residual[..., None]], axis=2)
-    products = gram(whitener, columns, linear.starts).products.sum(axis=0)
+    by_window = gram(whitener, columns, linear.starts).products
+    products = with_prior(by_window.sum(axis=0), solution.vector)
     candidates = [len(base) + k for k in range(len(terms))]
-    found = pursue(products, base, candidates, np.array([term.price for term in terms]))
+    found = agreed(by_window, products, base, pursue(products, base, candidates, np.array([t.price for t in terms])))
     free = [*base, *(place for place, _ in found)]
     own, cross, scale = normal(products, free)
     left = linear.residual - columns[..., free] @ (np.linalg.solve(own, cross) / scale)
     volume = _log_volume(whitener, linear.starts)
     return Choice([(place - len(base), gain) for place, gain in found], left, volume - left_over(products, free))
+
+
+def agreed(
+    by_window: Array, products: Array, base: list[int], found: list[tuple[int, float]]
+) -> list[tuple[int, float]]:
+    """Terms on which windows agree, `base` columns free: half the square of each in the covariance that the spread of
+    scores over windows gives (see `evidence`) is WORTH or more. by_window (windows, n, n), products (n, n): of all
+    columns, the residual last. Each term has the smaller of that and of what it brings if the model is taken for
+    true."""
+    while found:
+        free, last = [*base, *(place for place, _ in found)], len(products) - 1
+        own, cross, scale = normal(products, free)
+        size, inverse = np.linalg.solve(own, cross) / scale, np.linalg.inv(own) / scale[:, None] / scale
+        scores = by_window[:, free, last] - by_window[:, free][:, :, free] @ size
+        spread = inverse @ (scores.T @ scores) @ inverse * len(by_window) / max(len(by_window) - 1, 1)
+        worth = (0.5 * size**2 / np.maximum(np.diagonal(spread), 1e-300))[len(base) :]
+        worst = int(np.argmin(worth))
+        if worth[worst] >= WORTH:
+            return [(place, min(gain, float(w))) for (place, gain), w in zip(found, worth, strict=True)]
+        found = found[:worst] + found[worst + 1 :]
+    return []
 
 
 def _log_volume(whitener: Array, starts: Array) -> float:
