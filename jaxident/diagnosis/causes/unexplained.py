@@ -110,8 +110,8 @@ def agreed(
     while found:
         free, last = [*base, *(place for place, _ in found)], len(products) - 1
         own, cross, scale = normal(products, free)
-        size, inverse = np.linalg.solve(own, cross) / scale, np.linalg.inv(own) / scale[:, None] / scale
-        scores = by_window[:, free, last] - by_window[:, free][:, :, free] @ size
+        size, inverse = np.linalg.solve(own, cross), np.linalg.inv(own)  # in units of the columns' lengths
+        scores = (by_window[:, free, last] - by_window[:, free][:, :, free] @ (size / scale)) / scale
         spread = inverse @ (scores.T @ scores) @ inverse * len(by_window) / max(len(by_window) - 1, 1)
         worth = (0.5 * size**2 / np.maximum(np.diagonal(spread), 1e-300))[len(base) :]
         worst = int(np.argmin(worth))
