@@ -160,6 +160,8 @@ def _take_in(settings, noise: Noise, belief: _Belief, pose: Array, seen: Array) 
         covariance = covariance - gain[:, None] * shared
         square = jnp.minimum(left**2 / variance, LIMIT**2)
         total, far = total + jnp.where(seen, square, 0.0), far | (square == LIMIT**2)
+    # rounding makes the two halves differ, and each pose that is not taken in would double that
+    covariance = 0.5 * (covariance + jnp.swapaxes(covariance, 0, 1))
     taken = seen & ~far
     mean, doubtful = jnp.where(taken, mean, belief.mean), jnp.where(seen, DOUBT, 1.0) * belief.start
     return belief._replace(mean=mean, start=jnp.where(taken, covariance, doubtful)), total

@@ -21,6 +21,8 @@ def test_equal_wheels_are_likeliest_whatever_their_strength():
     for strength in (0.01, 1.0, 300.0):
         assert unlikeliness(robot([strength, strength, 7.0 * strength, -7.0 * strength])) == pytest.approx(0.0)
     assert unlikeliness(robot([1.2, 1.0, 5.0, -5.0])) == pytest.approx(0.5 * (np.arctan(0.2 / 2.2) / SPREAD) ** 2)
+    for turned in ([-1.0, -1.0, 5.0, -5.0], [1.0, 1.0, -5.0, 5.0], [-1.0, -1.0, -5.0, 5.0]):
+        assert unlikeliness(robot(turned)) == pytest.approx(0.0, abs=1e-12), "commands or axes the other way"
     assert unlikeliness(robot([2.2, -0.9, 5.0, -5.0])) > 50.0, "one wheel drives backwards"
 
 

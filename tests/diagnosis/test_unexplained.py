@@ -110,6 +110,7 @@ def test_a_term_that_one_window_alone_pays_for_is_not_told(everywhere):
         residual += 12.0 * columns[..., 11]
     else:
         residual[7] += 12.0 * columns[7, :, 11] / np.sum(columns[7, :, 11] ** 2)
+    columns[..., 3] = 0.0  # a dead zone that no command is near
     windows, products = by_window(columns, residual)
     found = pursue(products, list(range(10)), [10, 11], np.zeros(2))
     assert [place for place, _ in found] == [11]

@@ -12,15 +12,17 @@ from withheld.cases import simulate_runs
 
 from jaxident.array_types import State, Wheels
 from jaxident.effects.catalogue import CATALOGUE
+from jaxident.effects.coordinates import vector_of
 from jaxident.effects.simulate import simulate as simulate_with_effects
 from jaxident.estimation.filter import scan_filter
+from jaxident.estimation.filtered_state import filter_and_run
 from jaxident.estimation.joint_start import unsure
 from jaxident.estimation.joint_step import advance_belief
 from jaxident.estimation.predict import predict, prediction_error
 from jaxident.estimation.run_ahead import run_ahead
 from jaxident.estimation.runs import Runs
 from jaxident.estimation.session import session_time, with_session
-from jaxident.estimation.stretches import Starts, every
+from jaxident.estimation.stretches import Starts, cut_stretches, every
 from jaxident.log import join, make_log
 from jaxident.robot.dead_zone import effective_command
 from jaxident.robot.drive import Physical, force, hold
@@ -142,6 +144,24 @@ def test_a_start_that_does_not_converge_comes_from_a_run_up_and_is_counted():
     assert np.all(found.run_up == (found.start == 120))
     rows = found.start + found.step
     assert np.abs(found.x - log.x[rows]).max() < 0.005
+
+
+def test_a_covariance_stays_one_where_poses_are_refused_again_and_again():
+    """A camera that has lost the robot for half of the time, twelve rows each: refused poses double the covariance, and
+    what rounding made unequal in its two halves with it. Innovations then had negative squares, and a start that was
+    lost by metres counted as converged."""
+    noise = Noise(5e-4, 4e-3, None, 0.1, 0.9, 0.05)
+    marker = Effect("marker_offset", {"ahead": -0.008, "left": 0.04})
+    model = dataclasses.replace(ROBOT, noise=noise, effects=(marker,))
+    log = excite(jax.random.key(1), "multilevel", 400, PERIOD, hold=10)
+    log = jax.tree.map(np.asarray, simulate(dataclasses.replace(ROBOT, noise=noise), log, key=jax.random.key(2)))
+    away = 0.2 * (np.arange(len(log.t)) // 12 % 2)
+    log = log._replace(x=log.x + away)
+    starts = every(log, 20, 20)
+    stretch = cut_stretches(log, starts, 0, 200, 100, 0.0)
+    found = filter_and_run(vector_of(model), noise, None, stretch, 200)
+    assert np.min(found.innovation) >= 0.0
+    np.testing.assert_allclose(found.start, np.swapaxes(found.start, 1, 2), rtol=1e-9, atol=1e-12)
 
 
 def test_predictions_that_are_not_finite_are_counted_and_in_no_mean():

@@ -4,7 +4,9 @@ A log that turns one way only, or mostly at one command, says little of each whe
 effect for wheels that differ: half a Create's log, on which speed falls in left turns, asked for a left wheel that
 drives backwards at 0.4 times what the right one does.
 
-In the plane of a channel's two gains, equal wheels stand at 45 degrees. The angle from there is normal about zero.
+In the plane of a channel's two gains, equal wheels stand at 45 degrees. The angle from there is normal about zero. It
+is that of a line, between -90 and 90 degrees: a robot whose commands or whose camera's axes point the other way is as
+likely.
 """
 
 import numpy as np
@@ -24,7 +26,8 @@ def departures(vector: Array) -> tuple[np.ndarray, np.ndarray]:
     away, slopes = np.zeros(2), np.zeros((2, len(NOMINAL)))
     for channel, ((right, left), sign) in enumerate(zip(_GAINS, _SIGNS, strict=True)):
         one, other = vector[right], sign * vector[left]
-        away[channel] = (np.arctan2(other, one) - 0.25 * np.pi) / SPREAD
+        angle = np.arctan2(other, one) - 0.25 * np.pi
+        away[channel] = (angle - np.pi * np.round(angle / np.pi)) / SPREAD
         square = max(one**2 + other**2, 1e-12)
         slopes[channel, [right, left]] = np.array([-other, sign * one]) / square / SPREAD
     return away, slopes

@@ -5,8 +5,9 @@ normal about zero with the table's scale, the log evidence of a set by Laplace's
 
     1/2 b' (G + L)^-1 b - 1/2 log |I + L^-1/2 G L^-1/2| + log P(set),      L = diag(scale)^-2.
 
-It takes the model for true. Where something is missing in the model, some windows pay for an effect that the others do
-not want. So what an effect is worth beside others is half of x' V^-1 x, where that is less, with
+A column that asks for more than its scale widens it to that, once. The evidence takes the model for true. Where
+something is missing in the model, some windows pay for an effect that the others do not want. So what an effect is
+worth beside others is half of x' V^-1 x, where that is less, with
 
     V = (G + L)^-1 (J + L) (G + L)^-1,   J the sum over windows of s s',   s = b_i - G_i x their scores
 
@@ -21,6 +22,7 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.columns import LOW, NEUTRAL, Table
 from jaxident.diagnosis.causes.refit import Solution
+from jaxident.diagnosis.motion.linear import spread
 from jaxident.effects.coordinates import NOMINAL, PLACES, SHAPES, SMOOTH, limits, sizes
 
 CHANCE = float(np.log(0.03 / 0.97))
@@ -56,13 +58,10 @@ def _posterior(table: Table, chosen: Sequence[int]) -> _Posterior:
     """
     columns = [column for k in chosen for column in table.options[k].columns]
     whole = np.einsum("wij->ij", table.products[:, columns][:, :, columns])
-    right, scale = table.cross[:, columns].sum(axis=0), table.scale[columns]
-    free = np.arange(len(columns))
-    for widen in (True, False):
-        precision, mean, free = _positive_mean(whole, right, scale, free, table.positive[columns])
-        if widen:
-            scale = scale.copy()
-            scale[free] *= np.maximum(1.0, np.abs(mean))
+    right, scale, positive = table.cross[:, columns].sum(axis=0), table.scale[columns], table.positive[columns]
+    _, mean, free = _positive_mean(whole, right, scale, np.arange(len(columns)), positive)
+    scale[free] *= np.maximum(1.0, np.abs(mean))
+    precision, mean, free = _positive_mean(whole, right, scale, free, positive)
     return _Posterior([columns[k] for k in free], scale[free], mean, precision)
 
 
@@ -102,12 +101,9 @@ def worth(table: Table, chosen: Sequence[int], option: int) -> Worth:
     own = [columns.index(column) for column in table.options[option].columns if column in columns]
     if not own:
         return Worth(0.0, WRONG)
-    windows = len(table.cross)
-    scores = table.cross[:, columns] - table.products[:, columns][:, :, columns] @ (mean * scale)
-    scores = scores * scale
+    scores = (table.cross[:, columns] - table.products[:, columns][:, :, columns] @ (mean * scale)) * scale
     covariance = np.linalg.inv(precision)
-    spread = scores.T @ scores * windows / max(windows - 1, 1)
-    sandwich = (covariance @ (spread + np.eye(len(columns))) @ covariance)[np.ix_(own, own)]
+    sandwich = (covariance @ (spread(scores) + np.eye(len(columns))) @ covariance)[np.ix_(own, own)]
     plain = covariance[np.ix_(own, own)]
     gain, honest = (0.5 * float(mean[own] @ np.linalg.solve(each, mean[own])) for each in (plain, sandwich))
     positive = int(table.positive[[columns[k] for k in own]].sum())

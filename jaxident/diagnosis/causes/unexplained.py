@@ -10,7 +10,7 @@ from jaxident.diagnosis.causes.alike import with_prior
 from jaxident.diagnosis.causes.corrector import WORTH, Term, library, pursue
 from jaxident.diagnosis.causes.refit import Data, Solution
 from jaxident.diagnosis.causes.rhythm import rhythms
-from jaxident.diagnosis.motion.linear import gram, left_over, normal
+from jaxident.diagnosis.motion.linear import gram, left_over, normal, spread
 from jaxident.diagnosis.motion.responses import Responses
 from jaxident.diagnosis.noise.law import Law, white_whitener, whitener_of
 from jaxident.diagnosis.noise.sizing import size_noise
@@ -112,8 +112,8 @@ def agreed(
         own, cross, scale = normal(products, free)
         size, inverse = np.linalg.solve(own, cross), np.linalg.inv(own)  # in units of the columns' lengths
         scores = (by_window[:, free, last] - by_window[:, free][:, :, free] @ (size / scale)) / scale
-        spread = inverse @ (scores.T @ scores) @ inverse * len(by_window) / max(len(by_window) - 1, 1)
-        worth = (0.5 * size**2 / np.maximum(np.diagonal(spread), 1e-300))[len(base) :]
+        variance = np.diagonal(inverse @ spread(scores) @ inverse)
+        worth = (0.5 * size**2 / np.maximum(variance, 1e-300))[len(base) :]
         worst = int(np.argmin(worth))
         if worth[worst] >= WORTH:
             return [(place, min(gain, float(w))) for (place, gain), w in zip(found, worth, strict=True)]

@@ -99,6 +99,12 @@ def without_starts(whitener: Array, columns: Array, starts: Array) -> tuple[np.n
     return columns - basis @ taken, np.linalg.solve(upper, taken) / scale.transpose(0, 2, 1)
 
 
+def spread(scores: Array) -> np.ndarray:
+    """Covariance (n, n) of a sum of scores (windows, n) that is zero, as these spread over windows."""
+    windows = len(scores)
+    return scores.T @ scores * windows / max(windows - 1, 1)
+
+
 def left_over(products: Array, columns: list[int]) -> float:
     """Half the squares that a fit of the last column by some others leaves."""
     last = len(products) - 1

@@ -48,7 +48,7 @@ class Question(NamedTuple):
 def check_names(effects: tuple[str, ...]) -> None:
     """InputError unless these are two different effects, both of which shape the path."""
     if len(effects) != 2 or effects[0] == effects[1]:
-        raise InputError(f"--between {','.join(effects)}: give two different effects, as in transport_delay,motor_lag")
+        raise InputError(f"--between {','.join(effects)}: give two different effects with a comma between")
     for name in effects:
         if name not in CATALOGUE:
             raise InputError(f"--between: unknown effect {name!r}; `jaxident effects` lists the names")
