@@ -2,7 +2,7 @@
 
     python -m experiments.withheld.promise --cases CASES --answers ANSWERS --found FOUND --out PROMISE.json
 
-`gap.after` is the mean squared pose error of the corrected model over the camera's variance on runs that served nothing
+`gap.discovered` is the mean squared pose error of the corrected model over the camera's variance on runs that served nothing
 else. The same is taken of `jaxident predict corrected_model.json` on those runs (2 and 5 of six), and on four fresh
 runs of the hidden robot with noise, slip and chance, whose session goes on where the logs ended. Answers must be plain.
 """
@@ -96,7 +96,7 @@ def one(folder: pathlib.Path, case: pathlib.Path, fresh: Log) -> dict:
     same = [ji.read_log(path) for k in JUDGING for path in case.glob(f"real_{k}.*")]
     again = [mean_square(models["corrected"], log, rows, unit) for log in same]
     return {
-        "promised": gap["after"],
+        "promised": gap["discovered"],
         "same": float(np.mean(again)),
         "fresh": mean_square(models["corrected"], fresh, rows, unit),
         "nominal": mean_square(models["nominal"], fresh, rows, unit),

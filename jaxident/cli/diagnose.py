@@ -92,10 +92,12 @@ def _with_origin(found, logs, seed: int):
 
 def _told(found) -> list[str]:
     """What the terminal says of a diagnosis."""
-    from jaxident.report.account import account_lines
+    from jaxident.report.account import account_lines, plain_text
+    from jaxident.report.discovered import sentence
 
     lines = account_lines(found.account)
     lines.append(f"verdict: {SENTENCE[found.verdict].format(effects=' and '.join(found.selected))}")
+    lines += [f"discovered: {plain_text(sentence(shown))}" for shown in found.discovered]
     lines += [table([("cause", "takes part", "site"), *_causes(found)]), _gap(found)]
     if found.surplus:
         lines.append(f"your simulator has, and the robot has not: {', '.join(found.surplus)}")
@@ -115,7 +117,10 @@ def _gap(found) -> str:
     rows: list[tuple[str, ...]] = [("model", "error", "camera variances")]
     given = [("before", "as given", gap.before)] if any(p.nominal is not None for p in found.parameters) else []
     names = [*given, ("refitted", "nominal, parameters refitted" if given else "nominal", gap.refitted)]
-    for key, name, level in (*names, ("after", "corrected", gap.after), ("floor", "noise alone", gap.floor)):
+    last = [("after", "with named effects" if found.discovered else "corrected", gap.after)]
+    if found.discovered:
+        last.append(("discovered", "with discovered laws", gap.discovered))
+    for key, name, level in (*names, *last, ("floor", "noise alone", gap.floor)):
         rows.append((name, plain_text(error(rms[key])), f"{level:.3g}"))
     lines = f"root mean square error {gap.horizon:.3g} s ahead\n{table(rows)}"
     if gap.shrink.value is None or gap.shrink.interval is None:

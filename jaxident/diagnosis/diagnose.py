@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from jaxident.diagnosis import translate
 from jaxident.diagnosis.account.account import Account
+from jaxident.diagnosis.account.discovered import Shown
 from jaxident.diagnosis.account.measure import Gap, measure
 from jaxident.diagnosis.account.models import as_model
 from jaxident.diagnosis.account.shrink import Shrink
@@ -42,7 +43,8 @@ class Diagnosis(NamedTuple):
     """What `diagnose` found. verdict: "no_gap", "parameters", "effects", "partly", "unknown" or "undecided". selected:
     the named effects, in the order in which they were accepted. visible: the gain that each effect of typical size
     would have had; below CLAIMED this input could not have shown it. replay: what faint effects come out as. surplus:
-    effects that the user's simulator has and the robot has not."""
+    effects that the user's simulator has and the robot has not. discovered: laws in no catalogue, which the corrected
+    model has as well."""
 
     verdict: str
     judgement: Judgement
@@ -61,6 +63,7 @@ class Diagnosis(NamedTuple):
     finding: Finding
     surplus: tuple[str, ...] = ()
     simulator: Simulator | None = None
+    discovered: tuple[Shown, ...] = ()
 
     @property
     def not_testable(self) -> list[str]:
@@ -95,7 +98,7 @@ def diagnose(
     common, surplus = shared(shown, simulator)
     direct = direct_effects(prepared, finding, shown)
     given = None if simulator is None else as_model(prepared, simulator.vector, finding.law, simulator.effects, direct)
-    gap, account, where, shrinks, corrected = measure(prepared, finding, given, common, direct, seed)
+    gap, account, where, shrinks, corrected, laws = measure(prepared, finding, given, common, direct, seed)
     judgement = judge(finding, gap, extra, simulator)
     selected = tuple(name for name in shown if name not in common) if judgement.none < 0.5 else ()
     known = answers(finding.data, finding.nominal, prepared.largest)
@@ -104,7 +107,7 @@ def diagnose(
     nominal = to_model(prepared, finding.nominal.vector, finding.law, (), None, finding.nominal)
     return Diagnosis(verdict, judgement, gap, account, where, selected, parameters, visible(known),
                      replay(known, seed), advice(verdict, judgement), nominal, corrected, shrinks, prepared, finding,
-                     surplus, simulator)  # fmt: skip
+                     surplus, simulator, laws)  # fmt: skip
 
 
 def check_nominal(logs: Log | Sequence[Log], sim: Log | Sequence[Log] | None, model: Model | None) -> None:

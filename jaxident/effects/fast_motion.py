@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 
 from jaxident.array_types import Array, Pose, State, Wheels
+from jaxident.effects.discovered import Here, pushed, shifted, sideways
 from jaxident.effects.fast_input import SUBSTEPS
 from jaxident.effects.friction import slide
 from jaxident.effects.signals import Motion
@@ -50,7 +51,8 @@ def lags_of(drive: Physical, part: Array) -> list[Lag]:
 
 def report(settings, x: Array, y: Array, theta: Array) -> Pose:
     """What the camera makes of true poses."""
-    return seen(settings, Pose(x, y, theta), fast=True)
+    true = Pose(x, y, theta)
+    return shifted(settings, seen(settings, true, fast=True), true)
 
 
 def rolling(like: Array) -> list[Array]:
@@ -68,22 +70,26 @@ def advance_row(settings, drive: Physical, state: State, excess: list[Array], ro
         loads = [effect.law(middle, row.part, **values) for effect, values in acting("load", settings)]
         lightness = functools.reduce(operator.mul, loads)
         push = _force(drive, row.mean[number]), _force(drive, row.slope[number])
-        state, excess = _substep(settings, drive, state, excess, push, slip, row.part, row.lags, lightness)
+        here = Here(state.x, state.y, middle, Wheels(*row.mean[number]))
+        state, excess = _substep(settings, drive, state, excess, push, slip, row.part, row.lags, lightness, here)
     return state, excess
 
 
-def _substep(settings, drive: Physical, state: State, excess, push, slip, part: Array, lags, lightness: Array):
-    """The state one substep later, and by how much the wheels then turn faster than the ground; `excess`: they did."""
+def _substep(
+    settings, drive: Physical, state: State, excess, push, slip, part: Array, lags, lightness: Array, here: Here
+):
+    """The state one substep later, and by how much the wheels then turn faster than the ground; `excess`: they did.
+    here: what discovered laws may depend on besides the motion."""
     x, y, theta, v, w = state
     (pull, ramp), (lag_v, lag_w) = push, lags
     asked = _asked(drive, v, w, pull, ramp, -0.5)
     sliding = _sliding(settings, excess, asked, asked, part)
-    first = _added(settings, drive, (theta, v, w), pull, ramp, -0.5, lightness, sliding)
+    first = _added(settings, drive, (theta, v, w), pull, ramp, -0.5, lightness, sliding, here)
     begun = [sum(forces) for forces in zip(pull, first, slip, strict=True)]
     middle = _ahead(state, lag_v.half, lag_w.half, begun, 0.5 * part, None)
     later = _asked(drive, middle[1], middle[2], pull, ramp, 0.0)
     sliding = _sliding(settings, excess, asked, later, part)
-    more = _added(settings, drive, middle, pull, ramp, 0.0, lightness, sliding)
+    more = _added(settings, drive, middle, pull, ramp, 0.0, lightness, sliding, here)
     pull = [sum(forces) for forces in zip(pull, more, slip, strict=True)]
     _, free_v, free_w = _ahead(state, lag_v.whole, lag_w.whole, pull, part, ramp)
     rub = _friction(settings, drive, (v, w), (free_v, free_w), lags, lightness)
@@ -94,6 +100,7 @@ def _substep(settings, drive: Physical, state: State, excess, push, slip, part: 
     for weight, (angle, speed, turning) in ((1.0, (theta, v, w)), (4.0, middle), (1.0, end)):
         sine, cosine = sin_cos(angle)
         left = sum(effect.law(speed, turning, **values) for effect, values in acting("side", settings))
+        left = left + sideways(settings, Motion(speed, turning, angle), here)
         x_rate = x_rate + weight * (speed * cosine - left * sine)
         y_rate = y_rate + weight * (speed * sine + left * cosine)
     moved = State(x + part / 6.0 * x_rate, y + part / 6.0 * y_rate, *end)
@@ -138,7 +145,9 @@ def _sliding(settings, excess, start: Wheels, middle: Wheels, part: Array) -> li
     ]
 
 
-def _added(settings, drive: Physical, now, pull, ramp, place: float, lightness: Array, sliding) -> list[Array]:
+def _added(
+    settings, drive: Physical, now, pull, ramp, place: float, lightness: Array, sliding, here: Here
+) -> list[Array]:
     """Accelerations by effects, dry friction left out."""
     theta, v, w = now
     along, heading = _linear(drive, v, w, pull, ramp, place)
@@ -147,8 +156,10 @@ def _added(settings, drive: Physical, now, pull, ramp, place: float, lightness: 
     for (effect, values), wheels in zip(acting("grip", settings), sliding, strict=True):
         lost = [effect.law.lost(n, own, **values) for n, own in zip(asked, wheels, strict=True)]
         found = [have + lightness * more for have, more in zip(found, _force(drive, lost), strict=True)]
-    for effect, values in acting("body", settings):
-        found = [have + more for have, more in zip(found, effect.law(Motion(v, w, theta), **values), strict=True)]
+    bodies = [effect.law(Motion(v, w, theta), **values) for effect, values in acting("body", settings)]
+    more = pushed(settings, drive, Motion(v, w, theta), here)
+    for force in bodies if more is None else [*bodies, more]:
+        found = [have + own for have, own in zip(found, force, strict=True)]
     return found
 
 

@@ -8,6 +8,7 @@ import jax.numpy as jnp
 
 from jaxident.array_types import Array, Pose, State, Wheels
 from jaxident.effects.catalogue import CATALOGUE, by_name
+from jaxident.effects.discovered import DISCOVERED, Laws, shifted, with_laws
 from jaxident.effects.input_chain import at_rest, push
 from jaxident.effects.intervals import Grid, make_grid
 from jaxident.effects.signals import Motion
@@ -42,6 +43,7 @@ def run_full(
     session_time: Array = 0.0,
     substeps: int = SUBSTEPS,
     parts: frozenset[str] = EVERY,
+    laws: Laws | None = None,
 ) -> Pose:
     """Poses (samples,) that the camera reports of one run.
 
@@ -52,18 +54,30 @@ def run_full(
 
     parts, static: names of the effects that the program holds; of the others the vector is not read. The default, all
     of them, makes one program for every set; a program of few effects compiles and runs several times faster, and one
-    without friction, play, lag and the like takes no substeps.
+    without friction, play, lag and the like takes no substeps. laws: discovered ones, None for none.
     """
     pose = run_undisturbed(drive, dead_zone, vector, t, command, start, noise=noise, key=key, session_time=session_time,
-                           substeps=substeps, parts=parts)  # fmt: skip
+                           substeps=substeps, parts=parts, laws=laws)  # fmt: skip
     return pose if key is None else disturb(pose, vector, t, noise=noise, key=key, parts=parts)
 
 
 def run_undisturbed(
-    drive, dead_zone, vector, t, command: Wheels, start: State, *, noise, key, session_time=0.0, substeps, parts
+    drive,
+    dead_zone,
+    vector,
+    t,
+    command: Wheels,
+    start: State,
+    *,
+    noise,
+    key,
+    session_time=0.0,
+    substeps,
+    parts,
+    laws: Laws | None = None,
 ) -> Pose:
     """`run_full` before `disturb`: poses (samples,) as the camera would report them if it made no random error."""
-    settings = _settings(vector, parts)
+    settings = with_laws(_settings(vector, parts), laws)
     sent = _sent(settings, command, None if key is None else _keys(key))
     grid = _grid(settings, t, sent, session_time, substeps)
     push_aside = None
@@ -71,7 +85,8 @@ def run_undisturbed(
         drawn = slip(noise, draw_noise(key, len(t)), jnp.append(jnp.diff(t), 1.0))
         push_aside = Force(*(f[grid.row] for f in drawn))
     states = _scan(settings, drive, dead_zone, grid, push_aside, start, session_time - t[0])
-    return seen(settings, Pose(*(column[grid.at_row] for column in states.pose)))
+    true = Pose(*(column[grid.at_row] for column in states.pose))
+    return shifted(settings, seen(settings, true), true)
 
 
 def disturb(pose: Pose, vector: Array, t: Array, *, noise: Noise | None, key: Array, parts: frozenset[str]) -> Pose:
@@ -115,12 +130,17 @@ def _grid(settings: Settings, t: Array, sent: Wheels, session_time: Array, subst
     for effect, values in acting("arrival", settings):
         arrivals = effect.act(arrivals, session_time - t[0], **values)
     changes = [effect.act.instant(**values) - session_time + t[0] for effect, values in acting("load", settings)]
-    return make_grid(t, sent, substeps if settings.keys() & MOVING else 1, arrivals=arrivals, changes=changes)
+    return make_grid(t, sent, substeps if _moves(settings) else 1, arrivals=arrivals, changes=changes)
+
+
+def _moves(settings: Settings) -> bool:
+    """Whether the push changes while a command is held, or the drive is not linear."""
+    return bool(settings.keys() & MOVING) or DISCOVERED in settings
 
 
 def _scan(settings, drive, dead_zone, grid: Grid, slips: Force | None, start: State, offset: Array) -> State:
     """True states (points,) at the points of the grid; `offset` takes times of the log to session times."""
-    moving = bool(settings.keys() & MOVING)
+    moving = _moves(settings)
     solve = solve_half if moving else hold
     solved = jax.tree.map(grid.spread, solve(drive, grid.step))
     length = grid.spread(grid.step)
@@ -135,7 +155,7 @@ def _scan(settings, drive, dead_zone, grid: Grid, slips: Force | None, start: St
 
         pushed, memory = push(settings, dead_zone, memory, target, begin, h, speeds)
         if moving:
-            after, excess = move(settings, drive, state, excess, pushed, shove, changed, solution, h)
+            after, excess = move(settings, drive, state, excess, pushed, shove, changed, solution, h, begin)
         else:
             pull = force(drive, pushed.mean)
             if shove is not None:

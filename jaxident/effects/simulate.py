@@ -6,6 +6,7 @@ import numpy as np
 from jaxident.array_types import AT_REST, Array, Pose, State
 from jaxident.effects.catalogue import CATALOGUE, to_vector
 from jaxident.effects.checks import check_delay, check_effects
+from jaxident.effects.discovered import check_discovered, laws_of
 from jaxident.effects.full import run_full, substeps_for
 from jaxident.log import Log
 from jaxident.robot import simulate as nominal
@@ -22,9 +23,10 @@ def simulate(
     of free numerators takes no effects and refuses a log of another or an uneven period. InputError for these, for a
     log of several runs, and for effects that `check_effects` refuses. Differentiable in the model and the start.
     """
-    if not model.effects:
+    if not (model.effects or model.discovered):
         return nominal.simulate(model, log, start=start, key=key)
     check_effects(model.effects)
+    check_discovered(model.discovered)
     nominal.check_one_run(log)
     require_physical(model)
     if not isinstance(log.t, jax.core.Tracer):
@@ -33,7 +35,7 @@ def simulate(
     parts = frozenset(effect.name for effect in model.effects)
     vector = to_vector(model.effects)
     pose = _poses(model.dynamics, model.dead_zone, vector, log, start, model.noise, key, session_time,
-                  substeps=substeps_for(parts), parts=parts)  # fmt: skip
+                  laws_of(model.discovered), substeps=substeps_for(parts), parts=parts)  # fmt: skip
     return log._replace(x=pose.x, y=pose.y, theta=pose.theta)
 
 
@@ -43,7 +45,7 @@ def is_random(model: Model) -> bool:
 
 
 @jax.jit(static_argnames=("substeps", "parts"))
-def _poses(drive, dead_zone, vector, log: Log, start, noise, key, session_time, *, substeps: int, parts) -> Pose:
+def _poses(drive, dead_zone, vector, log: Log, start, noise, key, session_time, laws, *, substeps: int, parts) -> Pose:
     command = log.command
     return run_full(drive, dead_zone, vector, log.t, command, start, noise=noise, key=key, session_time=session_time,
-                    substeps=substeps, parts=parts)  # fmt: skip
+                    substeps=substeps, parts=parts, laws=laws)  # fmt: skip

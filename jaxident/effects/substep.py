@@ -14,6 +14,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array, State, Wheels
+from jaxident.effects.discovered import DISCOVERED, Here, pushed, sideways
 from jaxident.effects.friction import dry_friction
 from jaxident.effects.signals import Motion, Push
 from jaxident.effects.stages import acting, friction_level, holds
@@ -36,26 +37,27 @@ def solve_half(drive: Physical, step: Array) -> Half:
 
 
 def move(
-    settings, drive: Physical, state: State, excess: tuple, push: Push, slip: Force | None, changed, half: Half, h
+    settings, drive: Physical, state: State, excess: tuple, push: Push, slip: Force | None, changed, half: Half, h, time
 ) -> tuple[State, tuple]:
     """The state one substep of h [s] later, under a push, a random slip (acceleration) and before or after what loads
-    have `changed`, and by how much each wheel then turns faster than the ground; `excess`: by how much it did.
-
-    Friction, held over the substep, moves what the departure depends on, and the other way round: it is settled with
-    a first guess of the departure, and again with the departure that follows.
+    have `changed`, and by how much each wheel then turns faster than the ground; `excess`: by how much it did. time:
+    session time [s] at the start. Friction, held over the substep, moves what the departure depends on, and the other
+    way round: it is settled with a first guess of the departure, and again with the departure that follows.
     """
     pull = force(drive, push.mean)
     if slip is not None:
         pull = Force(pull.along + slip.along, pull.heading + slip.heading)
     ramp = None if push.slope is None else force(drive, push.slope)
     lightness = _lightness(settings, changed)
-    rubs, departs = holds(settings, "friction"), holds(settings, "load", "grip", "body")
+    rubs = holds(settings, "friction")
+    departs = holds(settings, "load", "grip", "body") or DISCOVERED in settings
+    here = Here(state.x, state.y, time + 0.5 * h, push.mean)
     start = Motion(state.v, state.w, state.theta)
     sliding: tuple = ()
 
     def departure(part: float, now: Motion) -> Motion:
         later = None if ramp is None else Force(*((part - 0.5) * f for f in ramp))
-        return _departure(settings, drive, now, pull, later, lightness, sliding)
+        return _departure(settings, drive, now, pull, later, lightness, sliding, here)
 
     if holds(settings, "grip"):
         first = _asked(drive, start, pull, ramp, -0.5)
@@ -71,7 +73,7 @@ def move(
         path = _runge_kutta(drive, departure, start, held, half, h)
         if rubs:
             held = _rubbed(settings, drive, start, pull, path[2], lightness, half)
-    return _arrive(settings, drive, state, held, path, half, h), excess
+    return _arrive(settings, drive, state, held, path, half, h, here), excess
 
 
 def _lightness(settings, changed: tuple) -> Array | None:
@@ -103,7 +105,14 @@ def _guess(departure, start: Motion, half: Half, h: Array) -> Motion:
 
 
 def _departure(
-    settings, drive: Physical, now: Motion, pull: Force, ramp: Force | None, lightness: Array | None, sliding: tuple
+    settings,
+    drive: Physical,
+    now: Motion,
+    pull: Force,
+    ramp: Force | None,
+    lightness: Array | None,
+    sliding: tuple,
+    here: Here,
 ) -> Motion:
     """N: acceleration with all effects less that of the linear drive under the held pull; `sliding` by each grip."""
     v, w, theta = now
@@ -119,8 +128,9 @@ def _departure(
             along, heading = along + factor * lost.along, heading + factor * lost.heading
         if lightness is not None:
             along, heading = along + (lightness - 1.0) * asked.along, heading + (lightness - 1.0) * asked.heading
-    for effect, values in acting("body", settings):
-        more = effect.act(now, **values)
+    bodies = [effect.act(now, **values) for effect, values in acting("body", settings)]
+    added = pushed(settings, drive, now, here)
+    for more in bodies if added is None else [*bodies, added]:
         along, heading = along + more.along, heading + more.heading
     return Motion(along, heading, jnp.zeros_like(theta))
 
@@ -140,7 +150,7 @@ def _runge_kutta(drive: Physical, departure, start: Motion, held: Force, half: H
     return k1, Motion(k4.v + decay_v, k4.w + decay_w, d.w), d
 
 
-def _arrive(settings, drive: Physical, state: State, held: Force, path, half: Half, h: Array) -> State:
+def _arrive(settings, drive: Physical, state: State, held: Force, path, half: Half, h: Array, here: Here) -> State:
     """The state at the end of the substep.
 
     The velocity's integral is that of the quintic through its values at start, middle and end and its rates at both
@@ -156,29 +166,34 @@ def _arrive(settings, drive: Physical, state: State, held: Force, path, half: Ha
         end = _sum(end, (1.0, d))
         rates = [Force(rates[0].along + first.v, rates[0].heading + first.w),
                  Force(rates[1].along + last.v, rates[1].heading + last.w)]  # fmt: skip
-    (x0, y0), (x1, y1), (x2, y2) = (_velocity(settings, now) for now in (start, middle, end))
-    (a0, b0), (a2, b2) = (_velocity_rate(settings, *pair) for pair in zip((start, end), rates, strict=True))
+    (x0, y0), (x1, y1), (x2, y2) = (_velocity(settings, now, here) for now in (start, middle, end))
+    (a0, b0), (a2, b2) = (_velocity_rate(settings, *pair, here) for pair in zip((start, end), rates, strict=True))
     x = state.x + h * ((7.0 * (x0 + x2) + 16.0 * x1) / 30.0 + h / 60.0 * (a0 - a2))
     y = state.y + h * ((7.0 * (y0 + y2) + 16.0 * y1) / 30.0 + h / 60.0 * (b0 - b2))
     return State(x, y, end.theta, end.v, end.w)
 
 
-def _velocity(settings, now: Motion) -> tuple[Array, Array]:
+def _velocity(settings, now: Motion, here: Here) -> tuple[Array, Array]:
     sine, cosine = sin_cos(now.theta)
-    x, y = now.v * cosine, now.v * sine
+    left = sideways(settings, now, here)
+    x, y = now.v * cosine - left * sine, now.v * sine + left * cosine
     for effect, values in acting("side", settings):
         left = effect.act(now.v, now.w, **values)
         x, y = x - left * sine, y + left * cosine
     return x, y
 
 
-def _velocity_rate(settings, now: Motion, rate: Force) -> tuple[Array, Array]:
+def _velocity_rate(settings, now: Motion, rate: Force, here: Here) -> tuple[Array, Array]:
     """Acceleration in x and y."""
     sine, cosine = sin_cos(now.theta)
     ahead, left = rate.along, now.w * now.v
     for effect, values in acting("side", settings):
         law = functools.partial(effect.act, **values)
         speed, gained = jax.jvp(law, (now.v, now.w), (rate.along, rate.heading))
+        ahead, left = ahead - now.w * speed, left + gained
+    if DISCOVERED in settings:
+        law = functools.partial(sideways, settings, here=here)
+        speed, gained = jax.jvp(law, (now,), (Motion(rate.along, rate.heading, now.w),))
         ahead, left = ahead - now.w * speed, left + gained
     return ahead * cosine - left * sine, ahead * sine + left * cosine
 

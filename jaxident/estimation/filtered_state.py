@@ -13,6 +13,7 @@ import jax.numpy as jnp
 
 from jaxident.array_types import Array, State, Wheels
 from jaxident.effects.coordinates import by_effect
+from jaxident.effects.discovered import Laws, with_laws
 from jaxident.effects.fast_input import SUBSTEPS, expected_pushes
 from jaxident.effects.fast_motion import Row, advance_row, drive_of, lags_of, report, rolling
 from jaxident.numerics import wrap
@@ -67,14 +68,16 @@ class _Belief(NamedTuple):
     excess: Any
 
 
-def filter_and_run(vector: Array, noise: Noise, lost: Array | None, stretch: Stretch, before: int) -> Run:
+def filter_and_run(
+    vector: Array, laws: Laws | None, noise: Noise, lost: Array | None, stretch: Stretch, before: int
+) -> Run:
     """The filter up to row `before`, that row's pose included, and the free run after it; pure.
 
-    vector (SIZE,): coordinates for the commands as they stand in the stretch. lost: the probability that a command
-    never arrives, None without. States are x, y, theta, v, w; then slip along and in heading where `noise.slip_time` is
-    given, and the camera's errors where its `correlation_time` is.
+    vector (SIZE,): coordinates for the commands as they stand in the stretch, and so are the discovered laws. lost: the
+    probability that a command never arrives, None without. States are x, y, theta, v, w; then slip along and in heading
+    where `noise.slip_time` is given, and the camera's errors where its `correlation_time` is.
     """
-    settings, drive = by_effect(vector), drive_of(vector)
+    settings, drive = with_laws(by_effect(vector), laws), drive_of(vector)
     t = stretch.t
     step = jnp.diff(t, axis=0, append=2.0 * t[-1:] - t[-2:-1])
     push, jolt = expected_pushes(settings, drive, vector[6:8], t, stretch.session, stretch.command, lost)

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.effects.checks import check_effects
+from jaxident.effects.discovered import check_discovered
 from jaxident.errors import InputError
 from jaxident.estimation import session
 from jaxident.estimation.predict_difference import run_difference_ahead
@@ -57,9 +58,10 @@ def predict(
     double precision.
     """
     require_float64("predict")
-    if model.effects:
+    if model.effects or model.discovered:
         require_physical(model)
         check_effects(model.effects)
+        check_discovered(model.discovered)
     stride = horizon if stride is None else stride
     for name, value, least in (("horizon", horizon, 1), ("burn-in", burn_in, 1), ("stride", stride, 1)):
         if value < least:

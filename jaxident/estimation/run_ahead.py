@@ -10,6 +10,7 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.effects.catalogue import BY_CHANCE
 from jaxident.effects.coordinates import vector_of
+from jaxident.effects.discovered import Laws, laws_of
 from jaxident.effects.fast_input import RUN_UP
 from jaxident.estimation.camera_noise import noise_for
 from jaxident.estimation.filtered_state import Run, Stretch, filter_and_run
@@ -64,10 +65,10 @@ def run_ahead(model: Model, log: Log, starts: Starts, horizon: int, *, burn_in: 
     lost = chance[BY_CHANCE["lost"]]["probability"] if BY_CHANCE["lost"] in chance else None
     filler = -(first + 1 + horizon) % ROWS
     stretch = cut_stretches(log, starts, first - before, before, horizon + filler, session_time)
-    ahead = slice(first + 1, first + 1 + horizon)
+    ahead, laws = slice(first + 1, first + 1 + horizon), laws_of(model.discovered)
 
     def run(vector: Array, stretch: Stretch) -> Run:
-        return _in_blocks(vector, noise, lost, stretch, first)
+        return _in_blocks(vector, laws, noise, lost, stretch, first)
 
     found, run_up = _filtered(partial(run, vector_of(model)), stretch, ahead, burn_in)
     pose, begin, slip = (np.moveaxis(leaf[ahead], -1, 0) for leaf in found[:3])
@@ -101,7 +102,7 @@ def _filtered(run: Callable[[Stretch], Run], stretch: Stretch, ahead: slice, bur
 _run_block = jax.jit(filter_and_run)
 
 
-def _in_blocks(vector: Array, noise: Noise, lost: float | None, stretch: Stretch, first: int) -> Run:
+def _in_blocks(vector: Array, laws: Laws | None, noise: Noise, lost: float | None, stretch: Stretch, first: int) -> Run:
     """`filter_and_run` of any number of stretches; the last block is filled up with copies of its last one."""
     count = stretch.t.shape[1]
     size, parts = next((n for n in LANES if n >= count), LANES[-1]), []
@@ -110,5 +111,5 @@ def _in_blocks(vector: Array, noise: Noise, lost: float | None, stretch: Stretch
         block = Stretch(*(
             np.take(leaf, chosen, axis=axis) for leaf, axis in zip(stretch, AXES, strict=True)
         ))  # fmt: skip
-        parts.append(jax.tree.map(np.asarray, _run_block(vector, noise, lost, block, first)))
+        parts.append(jax.tree.map(np.asarray, _run_block(vector, laws, noise, lost, block, first)))
     return Run(*(np.concatenate(leaves, axis=-1)[..., :count] for leaves in zip(*parts, strict=True)))

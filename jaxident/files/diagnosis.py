@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from jaxident.diagnosis.account.account import Account, Row
+from jaxident.diagnosis.account.discovered import Shown
 from jaxident.diagnosis.account.measure import Gap
 from jaxident.diagnosis.account.where import OF_COMMANDS, Region
 from jaxident.diagnosis.diagnose import Diagnosis
@@ -35,13 +36,32 @@ def diagnosis_to_dict(found: Diagnosis) -> dict[str, Any]:
         },
         "causes": _causes(found),
         "selected": list(found.selected),
-        "discovered": None,
+        "discovered": [_law(one) for one in found.discovered] or None,
         "surplus": list(found.surplus),
         "parameters": [p._asdict() for p in found.parameters],
         "not_testable": found.not_testable,
         "replays": _replays(found.replay),
         "terms": [{"site": term.site, "term": term.name, "gain": gain} for term, gain in found.finding.rest.terms],
         "next": found.next,
+    }
+
+
+def _law(shown: Shown) -> dict[str, Any]:
+    """One discovered law."""
+    law, form = shown.law, shown.form
+    columns = (np.asarray(column, float).tolist() for column in (law.at, law.value, law.standard_deviation))
+    keys = ("at", "value", "standard_deviation")
+    return {
+        "site": shown.kind.site,
+        "acts_on": law.acts_on,
+        "times": law.times,
+        "inputs": [law.signal] if law.times == "1" else [law.signal, law.times],
+        "memory": None,
+        "curve": [dict(zip(keys, point, strict=True)) for point in zip(*columns, strict=True)],
+        "rows": list(shown.density),
+        "share": shown.share,
+        "p_value": shown.p_value,
+        "looks_like": None if form is None else form._asdict(),
     }
 
 
@@ -76,7 +96,7 @@ def _gap(gap: Gap) -> dict[str, Any]:
         "before": gap.before,
         "refitted": gap.refitted,
         "after": gap.after,
-        "discovered": gap.after,
+        "discovered": gap.discovered,
         "floor": {"value": gap.floor, "interval": list(gap.floor_interval)},
         "shrink": gap.shrink.value,
         "shrink_interval": _listed(gap.shrink.interval),

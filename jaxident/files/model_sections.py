@@ -10,10 +10,11 @@ import numpy as np
 
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.checks import check_parameters
+from jaxident.effects.discovered import check_discovered
 from jaxident.errors import InputError
 from jaxident.files.schema import Shape, take_array, take_keys, take_list, take_number, take_object, take_text
 from jaxident.robot.drive import Physical
-from jaxident.robot.model import Effect, Provenance, Spread
+from jaxident.robot.model import Discovered, Effect, Provenance, Spread
 from jaxident.robot.noise import Noise
 
 SHAPES: dict[str, Shape] = {"alpha": (2,), "delta": (2, 2), "epsilon": (2, 2), "dead_zone": (2,)}
@@ -118,6 +119,34 @@ def write_effect(effect: Effect) -> dict[str, Any]:
         "parameters": {name: to_lists(value) for name, value in effect.parameters.items()},
         "standard_deviation": write_deviations(effect.standard_deviation),
     }
+
+
+def read_discovered(value: Any, where: str) -> tuple[Discovered, ...]:
+    """The discovered laws, each of a kind that this program knows."""
+    laws = tuple(_read_law(entry, f"{where}[{k}]") for k, entry in enumerate(take_list(value, where)))
+    try:
+        check_discovered(laws)
+    except InputError as error:
+        raise InputError(f"{where}: {str(error).removeprefix('discovered: ')}") from None
+    return laws
+
+
+def _read_law(value: Any, where: str) -> Discovered:
+    found = take_keys(value, where, ("acts_on", "signal", "at", "value"), ("times", "standard_deviation"))
+    words = {key: take_text(found[key] or "1", f"{where}.{key}") for key in ("acts_on", "times", "signal")}
+    count = len(take_list(found["at"], f"{where}.at"))
+    at, values = (take_array(found[key], f"{where}.{key}", (count,)) for key in ("at", "value"))
+    spread = found["standard_deviation"]
+    if spread is not None:
+        spread = take_array(spread, f"{where}.standard_deviation", (count,), least=0.0, gaps=True)
+    return Discovered(**words, at=at, value=values, standard_deviation=spread)
+
+
+def write_discovered(law: Discovered) -> dict[str, Any]:
+    """What a law acts on, its signal and its curve."""
+    words = {"acts_on": law.acts_on, "times": law.times, "signal": law.signal}
+    curve = {"at": to_lists(law.at), "value": to_lists(law.value)}
+    return {**words, **curve, "standard_deviation": write_deviations(law.standard_deviation)}
 
 
 def read_spread(value: Any, where: str) -> Spread:

@@ -23,6 +23,7 @@ from jaxident.files.model_sections import (
     SHAPES,
     or_none,
     read_covariance,
+    read_discovered,
     read_effects,
     read_noise,
     read_physical,
@@ -31,6 +32,7 @@ from jaxident.files.model_sections import (
     to_lists,
     write_covariance,
     write_deviations,
+    write_discovered,
     write_effect,
     write_noise,
     write_physical,
@@ -49,7 +51,7 @@ IMAGE_TOLERANCE = 1e-6
 """Largest departure of alpha, delta, epsilon from the image of `physical`, relative to the largest entry of each."""
 
 _NEEDED = ("schema", "sample_period", *SHAPES, "physical")
-_FREE = ("noise", "effects", "standard_deviation", "covariance", "provenance")
+_FREE = ("noise", "effects", "discovered", "standard_deviation", "covariance", "provenance")
 _compiled_image = jax.jit(to_difference)
 
 
@@ -88,6 +90,7 @@ def model_to_dict(model: Model) -> dict[str, Any]:
         "physical": or_none(write_physical, model.physical),
         "noise": or_none(write_noise, model.noise),
         "effects": [write_effect(effect) for effect in model.effects],
+        **({"discovered": [write_discovered(law) for law in model.discovered]} if model.discovered else {}),
         "standard_deviation": write_deviations(model.standard_deviation),
         "covariance": or_none(write_covariance, model.covariance, model.parameter_order),
         "provenance": write_provenance(model.provenance),
@@ -114,6 +117,8 @@ def model_from_dict(content: Any, known_effects: Collection[str] = tuple(CATALOG
     physical = or_none(read_physical, found["physical"], f"{name}: physical")
     if physical is not None:
         _check_image(difference, physical, period, name)
+    if found["discovered"] and physical is None:
+        raise InputError(f"{name}: discovered: needs a model with physical parameters; `physical` is null")
     order, covariance = or_none(read_covariance, found["covariance"], f"{name}: covariance") or ((), None)
     return Model(
         sample_period=period,
@@ -125,6 +130,7 @@ def model_from_dict(content: Any, known_effects: Collection[str] = tuple(CATALOG
         covariance=covariance,
         parameter_order=order,
         provenance=or_none(read_provenance, found["provenance"], f"{name}: provenance") or Provenance(),
+        discovered=or_none(read_discovered, found["discovered"], f"{name}: discovered") or (),
     )
 
 

@@ -25,6 +25,7 @@ _HOMES = {
     "gap_map": "diagnosis",
     "ranking": "diagnosis",
     "shrinks": "diagnosis",
+    "discovered": "diagnosis",
     "estimate_errors": "studies",
     "heat_map": "studies",
     "error_curves": "studies",

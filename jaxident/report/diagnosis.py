@@ -10,6 +10,7 @@ from jaxident.diagnosis.account.shrink import interval
 from jaxident.diagnosis.diagnose import DIFFERENT, Diagnosis
 from jaxident.report import causes, words
 from jaxident.report.account import account_section
+from jaxident.report.discovered import discovered
 from jaxident.report.lead import deviations, lead
 from jaxident.report.page import Figure, Page, Section, Table
 from jaxident.report.words import (
@@ -37,6 +38,7 @@ def diagnosis_page(found: Diagnosis, name: str) -> Page:
         _gap(found),
         _where(found),
         causes.causes(found),
+        *discovered(found),
         causes.shrink(found),
         _parameters(found),
         causes.hidden(found),
@@ -49,7 +51,7 @@ def _gap(found: Diagnosis) -> Section:
     """The errors of the models before and after, of all channels and of each, against the floor."""
     gap = found.gap
     levels, intervals = {}, {}
-    for label, errors in zip(_models(found), np.asarray(gap.errors), strict=True):
+    for label, errors in zip(names := _models(found), np.asarray(gap.errors), strict=True):
         kept = errors[np.isfinite(errors).all(axis=1)]
         if label and len(kept):
             channels = [kept, *(kept[:, [k]] for k in range(len(CHANNELS)))]
@@ -62,7 +64,7 @@ def _gap(found: Diagnosis) -> Section:
     figure, ax = plot.figure(size=(6.3, 2.9))
     plot.gap_levels(levels, floor, rows=rows, intervals=intervals, floor_interval=gap.floor_interval, ax=ax)
     picture = Figure(plot.image(figure), "Error of each model by channel, against the floor", GAP_CAPTION)
-    sizes = dict(zip((*_models(found), "floor"), (gap.rms[key] for key in RMS), strict=True))
+    sizes = dict(zip((*names, "floor"), (gap.rms[key] for key in RMS), strict=True))
     cells = [
         (name, length(sizes[name][0]), angle(sizes[name][1]), *(float(f"{value:.3g}") for value in values))
         for name, values in (levels | {"floor": floor}).items()
@@ -73,15 +75,17 @@ def _gap(found: Diagnosis) -> Section:
     return Section("How large the gap is", [GAP.format(horizon=gap.horizon), picture, table])
 
 
-RMS = ("before", "refitted", "after", "floor")
+RMS = ("before", "refitted", "after", "discovered", "floor")
 """Keys of `Gap.rms` in the order of the table."""
 
 
-def _models(found: Diagnosis) -> tuple[str, str, str]:
-    """Names of the models before, refitted and after; empty where one is the same as another."""
+def _models(found: Diagnosis) -> tuple[str, str, str, str]:
+    """Names of the models before, refitted, after and with discovered laws; empty where one is the same as another."""
     given = any(p.nominal is not None for p in found.parameters)
-    after = "corrected model" if found.finding.selected else ""
-    return "as given" if given else "", "parameters refitted" if given else "nominal model", after
+    after = "with named effects" if found.discovered else "corrected model"
+    last = "with discovered laws" if found.discovered else ""
+    named = after if found.finding.selected else ""
+    return "as given" if given else "", "parameters refitted" if given else "nominal model", named, last
 
 
 GAP = (

@@ -3,6 +3,7 @@
 from jaxident.diagnosis.account.account import REST
 from jaxident.diagnosis.diagnose import DIFFERENT, Diagnosis, Parameter
 from jaxident.report import words
+from jaxident.report.discovered import sentence
 from jaxident.report.words import EFFECTS, NOMINAL, error, number, parameters, percent, plain, together
 
 COUNTS = {2: "two", 3: "three", 4: "four"}
@@ -11,7 +12,19 @@ CLEAREST = 3
 
 
 def lead(found: Diagnosis) -> str:
-    """The verdict in a few sentences."""
+    """The verdict in a few sentences, and what was discovered in one."""
+    return f"{_verdict(found)}{_discovered(found)}"
+
+
+def _discovered(found: Diagnosis) -> str:
+    """Laws in no catalogue, and what they leave."""
+    if not found.discovered:
+        return ""
+    laws = _listed([sentence(shown) for shown in found.discovered])
+    return f" Discovered: {laws}. With that {error(found.gap.rms['discovered'])} are left."
+
+
+def _verdict(found: Diagnosis) -> str:
     rms = found.gap.rms
     if found.verdict == "no_gap":
         return (

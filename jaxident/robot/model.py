@@ -58,6 +58,23 @@ class Effect:
 
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
+class Discovered:
+    """A law in no catalogue that logs showed: `acts_on` gets `times` ("1", "v" or "w") times a curve of a signal.
+
+    at, value (knots,): the curve, straight between the knots and constant beyond; standard_deviation (knots,) of its
+    values, or None. Kinds, signals and units: `effects.discovered`.
+    """
+
+    acts_on: str = dataclasses.field(metadata={"static": True})
+    times: str = dataclasses.field(metadata={"static": True})
+    signal: str = dataclasses.field(metadata={"static": True})
+    at: Any
+    value: Any
+    standard_deviation: Any = None
+
+
+@jax.tree_util.register_dataclass
+@dataclasses.dataclass(frozen=True)
 class Model:
     """A robot: dead zones, then a linear drive in one of two forms.
 
@@ -75,6 +92,7 @@ class Model:
     covariance: Any = None
     parameter_order: tuple[str, ...] = dataclasses.field(default=(), metadata={"static": True})
     provenance: Provenance = dataclasses.field(default=Provenance(), metadata={"static": True})
+    discovered: tuple[Discovered, ...] = ()
 
     @property
     def physical(self) -> Physical | None:

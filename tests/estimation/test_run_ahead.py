@@ -159,7 +159,7 @@ def test_a_covariance_stays_one_where_poses_are_refused_again_and_again():
     log = log._replace(x=log.x + away)
     starts = every(log, 20, 20)
     stretch = cut_stretches(log, starts, 0, 200, 100, 0.0)
-    found = filter_and_run(vector_of(model), noise, None, stretch, 200)
+    found = filter_and_run(vector_of(model), None, noise, None, stretch, 200)
     assert np.min(found.innovation) >= 0.0
     np.testing.assert_allclose(found.start, np.swapaxes(found.start, 1, 2), rtol=1e-9, atol=1e-12)
 

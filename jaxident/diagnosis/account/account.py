@@ -59,18 +59,21 @@ def account_of(
     floor: Floor,
     unit: Array,
     seed: int = 0,
+    discovered: Array | None = None,
 ) -> Account:
     """The account from errors (starts, 3) of the model with each set of players, and the floor of that with all of
-    them; unit (3,): the camera's variances."""
-    kept = np.all([np.isfinite(error).all(axis=1) for error in errors.values()], axis=0)
+    them; unit (3,): the camera's variances; discovered (starts, 3): errors of the model that has discovered laws as
+    well, if any."""
+    last = errors[frozenset(players)] if discovered is None else discovered
+    kept = np.all([np.isfinite(error).all(axis=1) for error in (*errors.values(), last)], axis=0)
     squares = {joined: error[kept] ** 2 for joined, error in errors.items()}
     total, left = squares[frozenset()], squares[frozenset(players)]
     parts = {CAMERA: floor.camera[kept], START: floor.start[kept], SLIP: floor.slip[kept]}
     named = shapley(players, lambda joined: squares[joined])
     for name in dict.fromkeys((*players, *floor.chance)):
         parts[name] = named.get(name, np.zeros_like(total))
-    parts[DISCOVERED] = np.zeros_like(total)
-    parts[REST] = left - floor.total[kept]
+    parts[DISCOVERED] = left - last[kept] ** 2
+    parts[REST] = last[kept] ** 2 - floor.total[kept]
     rows = _rows(parts, total, unit, floor, kept, seed) if kept.any() else []
     return Account(horizon, int(kept.sum()), int(np.sum(~kept)), rows)
 

@@ -8,29 +8,25 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.account.account import Account, account_of
+from jaxident.diagnosis.account.discovered import Shown, confirm, each_law
 from jaxident.diagnosis.account.floor import Floor, floor_of
 from jaxident.diagnosis.account.judging import Judged, judge_model
-from jaxident.diagnosis.account.models import Corrected, corrected_of, placebo_of, players_of, with_players, without
+from jaxident.diagnosis.account.models import placebo_of, players_of, with_players, without
 from jaxident.diagnosis.account.shrink import HIGH, LOW, Shrink, interval, shrink_of
-from jaxident.diagnosis.account.slip_check import slip_seen
+from jaxident.diagnosis.account.sized import REPLAYS, sized_corrected
 from jaxident.diagnosis.account.where import Place, increments, locate
 from jaxident.diagnosis.causes.finding import Finding
 from jaxident.diagnosis.causes.unexplained import UNEXPLAINED
-from jaxident.diagnosis.motion.responses import respond
-from jaxident.diagnosis.noise.doubt import Draws, draw_laws, sizes_by_memory
-from jaxident.diagnosis.noise.law import Law, deviations, less_slip
-from jaxident.diagnosis.noise.sizing import Sized, sample
+from jaxident.diagnosis.noise.law import deviations
 from jaxident.diagnosis.prepare import Prepared
 from jaxident.robot.model import Model
-
-REPLAYS = 500
-"""Laws of noise, and robots, drawn as likely as the fit leaves them."""
 
 
 class Gap(NamedTuple):
     """Mean squared pose error over the camera's variance at the horizon [s], three channels alike, on rows used for
-    nothing else: the model as given, refitted, with the selected effects; the floor and its 90 % interval; the shrink.
-    `placebo`: the shrink of an effect that nothing speaks for. errors (models, starts, 3): before, refitted, after, as
+    nothing else: the model as given, refitted, with the selected effects, with the discovered laws as well; the floor
+    and its 90 % interval; the shrink.
+    `placebo`: the shrink of an effect that nothing speaks for. errors (models, starts, 3): of these four models, as
     squares over the camera's variances `unit` (3,) [m^2, m^2, rad^2]; noise: the floor of each start; run_up: starts of
     the corrected model where its filter did not converge."""
 
@@ -38,6 +34,7 @@ class Gap(NamedTuple):
     before: float
     refitted: float
     after: float
+    discovered: float
     floor: float
     floor_interval: tuple[float, float]
     shrink: Shrink
@@ -49,12 +46,12 @@ class Gap(NamedTuple):
 
     @property
     def rms(self) -> dict[str, tuple[float, float]]:
-        """Root mean square errors in position [m] and heading [rad] of the models and of the floor; `discovered` is the
-        corrected model's as long as nothing is discovered."""
+        """Root mean square errors in position [m] and heading [rad] of the models and of the floor; `discovered` is
+        `after` where nothing is discovered."""
         kept = np.isfinite(self.errors).all(axis=(0, 2))
-        names = ("before", "refitted", "after")
+        names = ("before", "refitted", "after", "discovered")
         squares = {name: own[kept] * self.unit for name, own in zip(names, self.errors, strict=True)}
-        squares |= {"discovered": squares["after"], "floor": self.noise.total[kept] if kept.any() else squares["after"]}
+        squares["floor"] = self.noise.total[kept] if kept.any() else squares["after"]
         return {name: (_root(own[:, 0] + own[:, 1]), _root(own[:, 2])) for name, own in squares.items()}
 
     @property
@@ -76,19 +73,21 @@ def _root(squares: Array) -> float:
 
 
 class Measured(NamedTuple):
-    """All that the judging rows tell, and the corrected model of which they tell it."""
+    """All that the judging rows tell, the corrected model of which they tell it, and the laws that were discovered."""
 
     gap: Gap
     account: Account
     where: Place
     shrinks: dict[str, Shrink]
     model: Model
+    discovered: tuple[Shown, ...]
 
 
 def measure(prepared: Prepared, finding: Finding, given: Model | None, common, direct: dict, seed: int = 0) -> Measured:
     """The gap before and after, the account, where it lies, and the shrink of each single effect; `given` is the model
     as given, `common` are effects that it has already, `direct` parameters of effects that show without a refit."""
-    corrected, draws = _corrected(prepared, finding, direct, seed)
+    shown = confirm(prepared, finding, direct, seed)
+    corrected, draws = (shown.named, shown.draws) if shown else sized_corrected(prepared, finding, direct, seed)
     law = corrected.law
     bare = dataclasses.replace(corrected.model, covariance=None, parameter_order=())
     players = players_of(corrected, common)
@@ -100,51 +99,36 @@ def measure(prepared: Prepared, finding: Finding, given: Model | None, common, d
     before = nobody if told is None else judge_model(told, prepared)
     floor = floor_of(corrected.model, everybody, prepared, law, draws)
     unit = deviations(law) ** 2
-    account = account_of(prepared.horizon, {k: j.error for k, j in judged.items()}, players, floor, unit, seed)
-    errors = np.stack([one.error**2 / unit for one in (before, nobody, everybody)])
+    last = everybody if shown is None else shown.judged
+    missed = {joined: one.error for joined, one in judged.items()}
+    account = account_of(prepared.horizon, missed, players, floor, unit, seed, last.error)
+    errors = np.stack([one.error**2 / unit for one in (before, nobody, everybody, last)])
     regular = bool(finding.rest.terms) and law.slip is not None
-    # terms left over are regular: so may be what the law calls slip, and then it is still to explain
-    least = floor.steady if regular else None
+    least = floor.steady if regular else None  # slip may be regular as well, and then it is still to explain
     level = float(np.mean(floor.total / unit))
 
     def shrink(model: Judged) -> Shrink:
         return shrink_of(errors[1], model.error**2 / unit, level, floor.draws, _wander(model, unit, seed), seed, least)
 
     shrinks = {name: shrink(judged[frozenset({name})]) for name in players}
-    name, model = placebo_of(prepared, finding, law)
-    placebo = (name, shrink(judge_model(model, prepared)))
-    kept = np.isfinite(errors).all(axis=(0, 2))
-    given_level, refitted, after = (float(np.mean(own[kept])) if kept.any() else float("nan") for own in errors)
+    name, idle = placebo_of(prepared, finding, law)
+    placebo = (name, shrink(judge_model(idle, prepared)))
     low, high = (float(q) for q in np.quantile(floor.likely, [LOW, HIGH]))
-    gap = Gap(prepared.horizon, given_level, refitted, after, level, (low, high), shrink(everybody), placebo, errors,
-              floor, unit, int(everybody.run_up.sum()))  # fmt: skip
+    gap = Gap(prepared.horizon, *_levels(errors), level, (low, high), shrink(everybody), placebo, errors, floor, unit,
+              int(last.run_up.sum()))  # fmt: skip
     moved = None
     if players and finding.unexplained <= UNEXPLAINED:
         moved = _moved(everybody, judge_model(without(bare, players), prepared), unit)
     place = locate(errors[1], floor.total / unit, everybody.path, prepared, moved, seed)
-    return Measured(gap, account, place, shrinks, corrected.model)
+    laws = () if shown is None else each_law(prepared, shown, errors[1], unit, seed)
+    return Measured(gap, account, place, shrinks, corrected.model if shown is None else shown.model, laws)
 
 
-def _corrected(prepared: Prepared, finding: Finding, direct: dict, seed: int) -> tuple[Corrected, Draws]:
-    """The corrected model, and draws of noise laws as likely as its own, with no more slip than it leaves room for."""
-    law, draws = _laws(finding, seed)
-    corrected = corrected_of(prepared, finding, law, direct)
-    factor = slip_seen(corrected.model, prepared, law)
-    if factor == 1.0:
-        return corrected, draws
-    return corrected_of(prepared, finding, less_slip(law, factor), direct), draws.less_slip(factor)
-
-
-def _laws(finding: Finding, seed: int) -> tuple[Law, Draws]:
-    """The law that the floor takes, and draws of laws as likely. Slip's memory is sized finely, unless something
-    is left unexplained, which slip would take up."""
-    best, windows = finding.fit, finding.data.windows
-    fitted = respond(np.exp(best.vector[:2]), best.linear.residual, windows)
-    given = sample(best.linear.residual, best.linear.starts, windows, fitted)
-    unknown = finding.unexplained > UNEXPLAINED
-    sizes = [Sized(finding.law, 0.0)] if unknown else sizes_by_memory(finding.likely, given)
-    likeliest = max(sizes, key=lambda sized: sized.log_likelihood).law
-    return likeliest, draw_laws(sizes, given, REPLAYS, seed)
+def _levels(errors: Array) -> tuple[float, float, float, float]:
+    """Means of errors (models, starts, 3) over starts that no model fails at: before, refitted, after, discovered."""
+    kept = np.isfinite(errors).all(axis=(0, 2))
+    before, refitted, after, last = (float(np.mean(own[kept])) if kept.any() else float("nan") for own in errors)
+    return before, refitted, after, last
 
 
 def _wander(judged: Judged, unit: Array, seed: int) -> np.ndarray:

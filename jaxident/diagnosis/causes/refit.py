@@ -9,6 +9,7 @@ from jaxident.diagnosis.causes.alike import unlikeliness, with_prior
 from jaxident.diagnosis.motion.linear import Linear, follow, gram, linearise, normal
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.coordinates import NOMINAL, PLACES, STEPPED, free_places, limits, neutral_vector
+from jaxident.effects.discovered import Laws
 
 MOST_STEPS = 20
 """Of one refit; what fits arrives in two to nine, what crawls is mostly an effect that is not there."""
@@ -73,7 +74,7 @@ def refit(data: Data, vector: Array, starts: Array, effects: tuple[str, ...], ho
             damping *= 10.0
             if damping > 1e6:
                 break
-    return Solution(vector, starts, places, linear, cost, _covariance(products), step_number)
+    return Solution(vector, starts, places, linear, cost, covariance_of(products), step_number)
 
 
 def _around(data: Data, vector: Array, starts: Array, places: list[int]) -> tuple[Linear, np.ndarray, np.ndarray]:
@@ -84,11 +85,13 @@ def _around(data: Data, vector: Array, starts: Array, places: list[int]) -> tupl
     return linear, with_prior(found.products.sum(axis=0), vector), found.solve
 
 
-def best_starts(data: Data, vector: Array, starts: Array, moved: Array) -> tuple[np.ndarray, float]:
+def best_starts(
+    data: Data, vector: Array, starts: Array, moved: Array, laws: Laws | None = None
+) -> tuple[np.ndarray, float]:
     """Starts (5, windows) moved in every window by the part of what is asked for (5, windows) that fits best, and half
     the squares: one window that shows little of its start must not stop the others."""
     lanes = starts + np.array(PARTS)[:, None, None] * moved
-    residual = follow(np.tile(vector, (len(lanes), 1)), lanes, data.windows)
+    residual = follow(np.tile(vector, (len(lanes), 1)), lanes, data.windows, laws)
     with np.errstate(over="ignore", invalid="ignore"):  # a start may run away
         squares = 0.5 * np.sum((data.whitener @ residual[..., None])[..., 0] ** 2, axis=2)
     squares = np.where(np.isnan(squares), np.inf, squares)
@@ -126,7 +129,7 @@ def _step(products: Array, now: Array, low: Array, high: Array, damping: float) 
     return step, float(step @ products[:-1, -1] - 0.5 * step @ products[:-1, :-1] @ step)
 
 
-def _covariance(products: Array) -> np.ndarray:
+def covariance_of(products: Array) -> np.ndarray:
     """Covariance of the free coordinates; directions without information get a large finite variance."""
     own, _, scale = normal(products, list(range(len(products) - 1)), ridge=0.0)
     values, vectors = np.linalg.eigh(own)

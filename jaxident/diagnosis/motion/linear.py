@@ -12,10 +12,11 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.motion.paths import push_of, residuals
+from jaxident.diagnosis.motion.paths import move, push_of, residuals
 from jaxident.diagnosis.motion.responses import answer_to_start
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.coordinates import BY_DRIVE, NOMINAL, PLACES, limits, sizes
+from jaxident.effects.discovered import Laws
 from jaxident.effects.fast_input import PUSHING
 
 START_STATES = 5
@@ -42,12 +43,12 @@ class Gram(NamedTuple):
     solve: Any
 
 
-_pushed, _moved = jax.jit(push_of), jax.jit(residuals)
+_pushed, _moved, _tracked = jax.jit(push_of), jax.jit(residuals), jax.jit(move)
 _BY_DRIVE = [PLACES[pair] for pair in sorted(BY_DRIVE)]
 _PUSHING = [6, 7, *(place for (name, _), place in PLACES.items() if name in PUSHING)]
 
 
-def follow(vectors: Array, starts: Array, windows: Windows) -> np.ndarray:
+def follow(vectors: Array, starts: Array, windows: Windows, laws: Laws | None = None) -> np.ndarray:
     """Residuals (batch, windows, numbers) at vectors (batch, SIZE) and starts (batch, 5, windows).
 
     One vector after the other: more lanes of one program run no faster, and vectors that drive the wheels alike, as
@@ -60,13 +61,14 @@ def follow(vectors: Array, starts: Array, windows: Windows) -> np.ndarray:
         driven = np.concatenate([driven, vectors[:, : len(NOMINAL)]], axis=1)
     _, first, own = np.unique(driven, axis=0, return_index=True, return_inverse=True)
     push = [_pushed(vectors[k], windows) for k in first]
-    found = [_moved(*pair, push[k], windows) for *pair, k in zip(vectors, starts, own.ravel(), strict=True)]
+    found = [_moved(*pair, push[k], windows, laws) for *pair, k in zip(vectors, starts, own.ravel(), strict=True)]
     whole = np.stack([np.asarray(one) for one in found])
     return whole.transpose(0, 2, 1, 3).reshape(len(whole), whole.shape[2], -1)
 
 
-def linearise(vector: Array, starts: Array, windows: Windows, places: list[int]) -> Linear:
-    """At a vector (SIZE,) and starts (5, windows), by the coordinates at some places of the vector."""
+def linearise(vector: Array, starts: Array, windows: Windows, places: list[int], laws: Laws | None = None) -> Linear:
+    """At a vector (SIZE,) and starts (5, windows), by the coordinates at some places of the vector, beside discovered
+    laws, if any."""
     step = PART * sizes()
     _, high = limits()
     step = np.where(vector + step > high, -step, step)[places]
@@ -75,12 +77,20 @@ def linearise(vector: Array, starts: Array, windows: Windows, places: list[int])
     vectors[1 + np.arange(columns), places] += step
     lanes = np.tile(starts, (len(vectors), 1, 1))
     lanes[[-2, -1], [3, 4]] += START_STEPS[:, None]
-    found = follow(vectors, lanes, windows)
+    found = follow(vectors, lanes, windows, laws)
     change = np.moveaxis(found[:1] - found[1:], 0, -1)
     # by position and heading in closed form; a robot that loses speed to friction or in turns is not slowed as it says
     answers = answer_to_start(np.exp(vector[:2]), found[0], windows)
     answers[..., 3:] = change[..., columns:] / START_STEPS
     return Linear(found[0], change[..., :columns] / step, answers)
+
+
+def motion_of(vector: Array, starts: Array, windows: Windows, laws: Laws | None = None) -> list[np.ndarray]:
+    """x, y, heading, v, w (windows, rows) at each row, and the mean pushes from there on (windows, rows, 2)."""
+    windows = jax.tree.map(jnp.asarray, windows)
+    push = _pushed(vector, windows)
+    states = [np.asarray(part).T for part in _tracked(vector, starts, push, windows, laws)]
+    return [*states, np.asarray(push.mean).mean(axis=1).transpose(2, 0, 1)]
 
 
 def gram(whitener: Array, columns: Array, starts: Array) -> Gram:

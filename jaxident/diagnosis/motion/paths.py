@@ -6,16 +6,17 @@ import jax.numpy as jnp
 from jaxident.array_types import Array, Pose, State
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.coordinates import by_effect
+from jaxident.effects.discovered import Laws, with_laws
 from jaxident.effects.fast_input import SUBSTEPS, Push, pushes
 from jaxident.effects.fast_motion import Row, advance_row, drive_of, lags_of, report, rolling
 from jaxident.numerics import wrap
 
 
-def residuals(vector: Array, starts: Array, push: Push, windows: Windows) -> Array:
+def residuals(vector: Array, starts: Array, push: Push, windows: Windows, laws: Laws | None = None) -> Array:
     """Measured minus modelled poses (rows, windows, 3), 0 where unseen; starts (5, windows) of the robot itself, and
-    what `push_of` says drives its wheels."""
-    states = move(vector, starts, push, windows)
-    return compare(report(by_effect(vector), *states.pose), windows)
+    what `push_of` says drives its wheels; laws: discovered ones, if any."""
+    states = move(vector, starts, push, windows, laws)
+    return compare(report(with_laws(by_effect(vector), laws), *states.pose), windows)
 
 
 def compare(pose: Pose, windows: Windows) -> Array:
@@ -24,9 +25,9 @@ def compare(pose: Pose, windows: Windows) -> Array:
     return jnp.where(windows.seen[..., None], jnp.stack([x, y, wrap(theta)], axis=-1), 0.0)
 
 
-def track(vector: Array, starts: Array, windows: Windows) -> State:
+def track(vector: Array, starts: Array, windows: Windows, laws: Laws | None = None) -> State:
     """True states (rows, windows) from starts (5, windows)."""
-    return move(vector, starts, push_of(vector, windows), windows)
+    return move(vector, starts, push_of(vector, windows), windows, laws)
 
 
 def push_of(vector: Array, windows: Windows) -> Push:
@@ -37,9 +38,9 @@ def push_of(vector: Array, windows: Windows) -> Push:
     return Push(*(part[places, windows.run].transpose(0, 2, 3, 1) for part in push))
 
 
-def move(vector: Array, starts: Array, push: Push, windows: Windows) -> State:
+def move(vector: Array, starts: Array, push: Push, windows: Windows, laws: Laws | None = None) -> State:
     """True states (rows, windows) under pushes (rows, substeps, 2, windows)."""
-    settings, drive, part = by_effect(vector), drive_of(vector), windows.step / SUBSTEPS
+    settings, drive, part = with_laws(by_effect(vector), laws), drive_of(vector), windows.step / SUBSTEPS
     time = windows.session[windows.run] + windows.t[windows.first, windows.run]
     begin = time + jnp.cumsum(windows.step, axis=0) - windows.step
 

@@ -1,0 +1,57 @@
+"""The corrected model with the noise law that the account takes for it, with discovered curves or without."""
+
+import dataclasses
+
+import numpy as np
+
+from jaxident.diagnosis.account.models import Corrected, corrected_of
+from jaxident.diagnosis.account.slip_check import slip_seen
+from jaxident.diagnosis.causes.finding import Finding
+from jaxident.diagnosis.causes.unexplained import UNEXPLAINED
+from jaxident.diagnosis.discovery.fit import Bending, as_law
+from jaxident.diagnosis.motion.responses import respond
+from jaxident.diagnosis.noise.doubt import Draws, draw_laws, sizes_by_memory
+from jaxident.diagnosis.noise.law import Law, less_slip
+from jaxident.diagnosis.noise.sizing import Sized, sample
+from jaxident.diagnosis.prepare import Prepared
+
+REPLAYS = 500
+"""Laws of noise, and robots, drawn as likely as the fit leaves them."""
+
+
+def sized_corrected(
+    prepared: Prepared, finding: Finding, direct: dict, seed: int, bending: Bending | None = None
+) -> tuple[Corrected, Draws]:
+    """The corrected model, and draws of noise laws as likely as its own, with no more slip than it leaves room for."""
+    law, draws = _laws(finding, seed)
+    corrected = with_curves(corrected_of(prepared, finding, law, direct), bending, prepared.largest)
+    factor = slip_seen(corrected.model, prepared, law)
+    if factor == 1.0:
+        return corrected, draws
+    law = less_slip(law, factor)
+    return with_curves(corrected_of(prepared, finding, law, direct), bending, prepared.largest), draws.less_slip(factor)
+
+
+def with_curves(corrected: Corrected, bending: Bending | None, largest: float, but: int = -1) -> Corrected:
+    """The corrected model with curves, without one of them if told."""
+    if bending is None:
+        return corrected
+    kept = tuple(as_law(curve, largest) for k, curve in enumerate(bending.curves) if k != but)
+    return corrected._replace(model=dataclasses.replace(corrected.model, discovered=kept))
+
+
+def beside(finding: Finding, bending: Bending) -> Finding:
+    """The finding as refitted with curves, its noise sized beside them."""
+    return finding._replace(fit=bending.fit, law=bending.law, likely=bending.law)
+
+
+def _laws(finding: Finding, seed: int) -> tuple[Law, Draws]:
+    """The law that the floor takes, and draws of laws as likely. Slip's memory is sized finely, unless something
+    is left unexplained, which slip would take up."""
+    best, windows = finding.fit, finding.data.windows
+    fitted = respond(np.exp(best.vector[:2]), best.linear.residual, windows)
+    given = sample(best.linear.residual, best.linear.starts, windows, fitted)
+    unknown = finding.unexplained > UNEXPLAINED
+    sizes = [Sized(finding.law, 0.0)] if unknown else sizes_by_memory(finding.likely, given)
+    likeliest = max(sizes, key=lambda sized: sized.log_likelihood).law
+    return likeliest, draw_laws(sizes, given, REPLAYS, seed)

@@ -1,0 +1,132 @@
+"""Laws that could be discovered: where they act, what they depend on, and how the poses answer to each piece of curve.
+
+A curve is a sum of hats, one at each knot. Columns are answers of the poses to the hats, linear about a fitted path.
+"""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jaxident.array_types import Array
+from jaxident.diagnosis.causes.refit import Solution
+from jaxident.diagnosis.motion.linear import motion_of
+from jaxident.diagnosis.motion.responses import Responses
+from jaxident.diagnosis.motion.windows import Windows
+from jaxident.effects.discovered import ACTS, BY_CAMERA, Laws
+
+KNOTS = 10
+"""Of a curve. No other number was tried."""
+INSIDE = (0.01, 0.99)
+"""Quantiles of a signal between which its knots lie."""
+VARIED = 1e-6
+"""A signal that spans less than this tells no curve."""
+ALONG, HEADING, SIDEWAYS, WHEELS, AHEAD, LEFT, TURN = ACTS
+OF_FORCE = ("v", "w", "heading", "x", "y", "time", "push right", "push left")
+SITE_OF_SIGNAL = {
+    "v": "drive", "w": "drive", "heading": "contact", "x": "contact", "y": "contact", "time": "time",
+    "push right": "actuation", "push left": "actuation", "own speed": "drive", "own push": "actuation",
+}  # fmt: skip
+"""The site of a law that acts on accelerations or pushes, by its signal."""
+
+
+class Kind(NamedTuple):
+    """Where a law acts, what its curve is multiplied with, and what the curve depends on."""
+
+    acts_on: str
+    times: str
+    signal: str
+
+    @property
+    def site(self) -> str:
+        """The site of the catalogue that such a law belongs to."""
+        if self.acts_on in BY_CAMERA:
+            return "camera"
+        return "contact" if self.acts_on == SIDEWAYS else SITE_OF_SIGNAL[self.signal]
+
+
+KINDS = (
+    *(Kind(act, "1", signal) for act in (ALONG, HEADING) for signal in OF_FORCE),
+    *(Kind(act, "v", signal) for act in (ALONG, HEADING) for signal in ("w", "heading", "x", "y", "time")),
+    *(Kind(act, "w", signal) for act in (ALONG, HEADING) for signal in ("v", "heading", "x", "y", "time")),
+    *(Kind(SIDEWAYS, "v", signal) for signal in ("w", "heading", "x", "y", "time")),
+    *(Kind(SIDEWAYS, "1", signal) for signal in ("w", "heading")),
+    *(Kind(WHEELS, "1", signal) for signal in ("own speed", "own push")),
+    *(Kind(act, "1", signal) for act in (AHEAD, LEFT, TURN) for signal in ("heading", "x", "y")),
+)
+"""All that are tried. What stands as a product in two of them (v times a curve of w, w times one of v) stands twice."""
+
+
+class Path(NamedTuple):
+    """Signals (windows, rows) along the path of a fit, and by wheel those of its own (windows, rows, 2); gain (2, 2) of
+    the nominal drive; heading (windows, rows); seen (windows, numbers)."""
+
+    signals: dict[str, Any]
+    own: dict[str, Any]
+    gain: Any
+    seen: Any
+
+
+class Candidate(NamedTuple):
+    """A kind of law, its knots (knots,), and answers of the poses to a unit at each (windows, numbers, knots); density
+    (knots,): rows that lie nearest to each."""
+
+    kind: Kind
+    at: Any
+    columns: Any
+    density: Any
+
+
+def path_of(fit: Solution, windows: Windows, laws: Laws | None = None) -> Path:
+    """The signals along the path of a fit with some laws."""
+    motion = motion_of(fit.vector, fit.starts, windows, laws)
+    x, y, theta, v, w, push = (np.asarray(part) for part in motion)
+    rates, gain = np.exp(fit.vector[:2]), fit.vector[2:6].reshape(2, 2)
+    speeds = np.stack([rates[0] * v, rates[1] * w], axis=-1) @ np.linalg.pinv(gain).T
+    step = np.asarray(windows.step).T
+    begin = windows.session[windows.run] + windows.t[windows.first, windows.run]
+    time = begin[:, None] + np.cumsum(step, axis=1) - step
+    heading = (theta + np.pi) % (2.0 * np.pi) - np.pi
+    signals = {"1": np.ones_like(v), "v": v, "w": w, "heading": heading, "x": x, "y": y, "time": time,
+               "push right": push[..., 0], "push left": push[..., 1]}  # fmt: skip
+    seen = np.repeat(np.asarray(windows.seen).T, 3, axis=1)
+    return Path(signals, {"own speed": speeds, "own push": push}, gain, seen)
+
+
+def candidates(path: Path, responses: Responses) -> Iterator[Candidate]:
+    """Every kind of law whose signal varies, about a path."""
+    for kind in KINDS:
+        signal = path.own[kind.signal] if kind.acts_on == WHEELS else path.signals[kind.signal]
+        low, high = np.quantile(signal, INSIDE)
+        if high - low > VARIED:
+            at = np.linspace(low, high, KNOTS)
+            density = np.bincount(np.abs(signal.ravel()[:, None] - at).argmin(axis=1), minlength=KNOTS)
+            yield Candidate(kind, at, columns_of(kind, at, path, responses), density)
+
+
+def columns_of(kind: Kind, at: Array, path: Path, responses: Responses) -> np.ndarray:
+    """Answers of the poses (windows, numbers, knots) to a unit at each knot of a law."""
+    if kind.acts_on == WHEELS:
+        each = hats(path.own[kind.signal], at)
+        along, heading = (np.einsum("wrsk,s->wrk", each, row) for row in path.gain)
+        return responses.along @ along + responses.heading @ heading
+    shape = hats(path.signals[kind.signal], at) * path.signals[kind.times][..., None]
+    if kind.acts_on in BY_CAMERA:
+        return _by_camera(kind.acts_on, shape, path)
+    answer = {ALONG: responses.along, HEADING: responses.heading, SIDEWAYS: responses.left}[kind.acts_on]
+    return answer @ shape
+
+
+def _by_camera(act: str, shape: Array, path: Path) -> np.ndarray:
+    """Answers of the poses to an error of the camera (windows, rows, knots)."""
+    sine, cosine = np.sin(path.signals["heading"]), np.cos(path.signals["heading"])
+    none, one = np.zeros_like(sine), np.ones_like(sine)
+    by_pose = {AHEAD: (cosine, sine, none), LEFT: (-sine, cosine, none), TURN: (none, none, one)}[act]
+    whole = np.stack([part[..., None] * shape for part in by_pose], axis=2)
+    return path.seen[..., None] * whole.reshape(len(shape), -1, shape.shape[2])
+
+
+def hats(signal: Array, at: Array) -> np.ndarray:
+    """Weights (..., knots) of even knots (knots,) in a curve that is straight between them and constant beyond."""
+    place = np.clip((signal - at[0]) / (at[1] - at[0]), 0.0, len(at) - 1.0)
+    return np.maximum(1.0 - np.abs(place[..., None] - np.arange(len(at))), 0.0)

@@ -1,0 +1,163 @@
+"""Curves fitted together with the nominal robot and its effects: Gauss-Newton steps, shortened until they help."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jaxident.array_types import Array
+from jaxident.diagnosis.causes.alike import unlikeliness, with_prior
+from jaxident.diagnosis.causes.refit import Data, Solution, best_starts, covariance_of
+from jaxident.diagnosis.discovery.candidates import Kind, columns_of, path_of
+from jaxident.diagnosis.discovery.curves import precision, solved
+from jaxident.diagnosis.motion.linear import Gram, Linear, gram, linearise
+from jaxident.diagnosis.motion.responses import respond
+from jaxident.diagnosis.noise.law import Law
+from jaxident.effects.coordinates import limits
+from jaxident.effects.discovered import Laws, laws_of
+from jaxident.robot.model import Discovered
+
+MOST_STEPS = 10
+"""Of one fit; on simulated robots two to five were taken."""
+ENOUGH = 0.05
+"""Fall of -log p below which a fit has arrived."""
+SHORTER = (1.0, 0.5, 0.2, 0.05)
+"""Parts of a step that are tried."""
+
+
+class Curve(NamedTuple):
+    """A discovered law for commands over their largest: knots, values there and their deviations (knots,), the variance
+    of its roughness prior, how many rows lie nearest to each knot, and what it brought when it was chosen: its log
+    evidence, and the fall of -log p on windows left out."""
+
+    kind: Kind
+    at: Any
+    value: Any
+    deviation: Any
+    variance: float
+    density: Any
+    evidence: float
+    held_out: float
+
+
+class Bending(NamedTuple):
+    """A fit of the nominal robot, its effects and some curves, and the noise law beside them."""
+
+    fit: Solution
+    curves: tuple[Curve, ...]
+    law: Law
+
+
+class _Around(NamedTuple):
+    """What a step needs: linearisation and Gram matrices of slopes, curves' columns and residual; the summed products
+    with all priors."""
+
+    linear: Linear
+    gram: Gram
+    summed: Any
+
+
+def laws_from(curves: tuple[Curve, ...]) -> Laws | None:
+    """The curves as the integrators take them."""
+    return laws_of([as_law(curve) for curve in curves])
+
+
+def as_law(curve: Curve, largest: float = 1.0) -> Discovered:
+    """A curve as a model holds it, in the user's unit."""
+    kind = curve.kind
+    up = largest if kind.acts_on == "push of each wheel" else 1.0
+    along = largest if kind.signal.startswith(("push", "own")) else 1.0
+    return Discovered(*kind, along * curve.at, up * curve.value, up * curve.deviation)
+
+
+def curve_columns(fit: Solution, data: Data, curves: tuple[Curve, ...]) -> np.ndarray:
+    """Answers of the poses (windows, numbers, knots of all curves) about a fit that has these curves."""
+    none = np.zeros((*fit.linear.residual.shape, 0))
+    if not curves:
+        return none
+    responses = respond(np.exp(fit.vector[:2]), fit.linear.residual, data.windows)
+    path = path_of(fit, data.windows, laws_from(curves))
+    return np.concatenate([columns_of(curve.kind, curve.at, path, responses) for curve in curves], axis=2)
+
+
+def smoothness(curves: tuple[Curve, ...]) -> np.ndarray:
+    """Prior precision (n, n) of the values of all curves, one after the other."""
+    count = sum(len(curve.at) for curve in curves)
+    whole, place = np.zeros((count, count)), 0
+    for curve in curves:
+        own = slice(place, place + len(curve.at))
+        whole[own, own] = precision(len(curve.at)) / curve.variance
+        place += len(curve.at)
+    return whole
+
+
+def refit_with(data: Data, fit: Solution, curves: tuple[Curve, ...]) -> tuple[Solution, tuple[Curve, ...]]:
+    """The fit nearest downhill of a fit and curves: nominal parameters, effects, start states and values at knots."""
+    low, high = (bound[fit.places] for bound in limits())
+    smooth = smoothness(curves)
+    starts, cost = best_starts(data, fit.vector, fit.starts, np.zeros_like(fit.starts), laws_from(curves))
+    cost = cost + unlikeliness(fit.vector) + _roughness(curves, smooth)
+    now = fit._replace(starts=starts)
+    around = _look(data, now, curves, smooth)
+    for _ in range(MOST_STEPS):
+        step = solved(around.summed, len(around.summed) - 1)
+        for part in SHORTER:
+            vector, bent, starts, there = _moved(data, now, curves, around, part * step, (low, high))
+            there += _roughness(bent, smooth)
+            if there < cost:
+                break
+        else:
+            break
+        gained, cost, curves = cost - there, there, bent
+        now = now._replace(vector=vector, starts=starts)
+        around = _look(data, now, curves, smooth)
+        if gained < ENOUGH:
+            break
+    return _arrived(now._replace(linear=around.linear, cost=cost), curves, around)
+
+
+def _look(data: Data, now: Solution, curves: tuple[Curve, ...], smooth: Array) -> _Around:
+    """The linearisation about a fit and its curves."""
+    linear = linearise(now.vector, now.starts, data.windows, now.places, laws_from(curves))
+    columns = curve_columns(now._replace(linear=linear), data, curves)
+    whole = np.concatenate([linear.slopes, columns, linear.residual[..., None]], axis=2)
+    found = gram(data.whitener, whole, linear.starts)
+    summed, own = with_prior(found.products.sum(axis=0), now.vector), len(now.places)
+    summed[own:-1, own:-1] += smooth
+    summed[own:-1, -1] -= smooth @ _values(curves)
+    return _Around(linear, found, summed)
+
+
+def _moved(data: Data, now: Solution, curves, around: _Around, step: Array, bounds):
+    """Vector, curves, starts and half the squares after a step, as far as the bounds let it."""
+    own, vector = len(now.places), np.array(now.vector)
+    vector[now.places] = np.clip(vector[now.places] + step[:own], *bounds)
+    step = np.concatenate([vector[now.places] - now.vector[now.places], step[own:]])
+    bent = _with_values(curves, _values(curves) + step[own:])
+    moved = around.gram.solve[:, :, -1] - around.gram.solve[:, :, :-1] @ step
+    starts, cost = best_starts(data, vector, now.starts, moved.T, laws_from(bent))
+    return vector, bent, starts, cost + unlikeliness(vector)
+
+
+def _arrived(fit: Solution, curves: tuple[Curve, ...], around: _Around) -> tuple[Solution, tuple[Curve, ...]]:
+    """The fit and its curves with their covariance and deviations."""
+    own = len(fit.places)
+    covariance = covariance_of(around.summed)
+    spread = np.sqrt(np.maximum(np.diagonal(covariance)[own:], 0.0))
+    pieces = np.split(spread, np.cumsum([len(curve.at) for curve in curves])[:-1])
+    found = tuple(curve._replace(deviation=part) for curve, part in zip(curves, pieces, strict=True))
+    return fit._replace(covariance=covariance[:own, :own]), found
+
+
+def _values(curves: tuple[Curve, ...]) -> np.ndarray:
+    return np.concatenate([curve.value for curve in curves])
+
+
+def _with_values(curves: tuple[Curve, ...], values: Array) -> tuple[Curve, ...]:
+    pieces = np.split(values, np.cumsum([len(curve.at) for curve in curves])[:-1])
+    return tuple(curve._replace(value=part) for curve, part in zip(curves, pieces, strict=True))
+
+
+def _roughness(curves: tuple[Curve, ...], smooth: Array) -> float:
+    """-log p of the curves' values under their priors, but for a constant."""
+    values = _values(curves)
+    return 0.5 * float(values @ smooth @ values)

@@ -1,0 +1,126 @@
+"""The curves that are discovered: one after the other, the one that brings most, until none is worth it.
+
+What a curve is worth is the smaller of its log evidence, less the price of having looked at so many kinds, and what it
+brings to stretches that it was not fitted to. The runs kept for judging have no part in this.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from jaxident.array_types import Array
+from jaxident.diagnosis.causes.alike import with_prior
+from jaxident.diagnosis.causes.corrector import WORTH
+from jaxident.diagnosis.causes.finding import Finding
+from jaxident.diagnosis.causes.refit import Data, Solution
+from jaxident.diagnosis.causes.rounds import LIKELY
+from jaxident.diagnosis.discovery.candidates import KINDS, KNOTS, candidates, path_of
+from jaxident.diagnosis.discovery.curves import Bent, bend
+from jaxident.diagnosis.discovery.fit import (
+    Bending,
+    Curve,
+    curve_columns,
+    laws_from,
+    refit_with,
+    smoothness,
+)
+from jaxident.diagnosis.motion.linear import without_starts
+from jaxident.diagnosis.motion.responses import respond
+from jaxident.diagnosis.motion.windows import Windows
+from jaxident.diagnosis.noise.law import Law, whitener_of
+from jaxident.diagnosis.noise.sizing import size_noise
+from jaxident.effects.discovered import MOST_LAWS
+
+PRICE = float(np.log(len(KINDS)))
+"""Of having looked at all kinds of laws."""
+FEWEST = 8
+"""Windows that a curve needs: two for each stretch that is left out once."""
+
+
+class Standing(NamedTuple):
+    """Where a search stands: a fit, its curves, the noise law and the data under it."""
+
+    fit: Solution
+    curves: tuple[Curve, ...]
+    law: Law
+    data: Data
+
+
+def discover(finding: Finding) -> list[Bending]:
+    """Fits with one curve, two and so on; none where nothing is worth it."""
+    if len(finding.data.windows.run) < FEWEST:
+        return []
+    now = _stands(finding.data.windows, finding.fit, (), finding.law)
+    found: list[Bending] = []
+    while len(found) < MOST_LAWS:
+        more = _next(now)
+        if more is None:
+            break
+        now = more
+        found.append(Bending(now.fit, now.curves, now.law))
+    return found
+
+
+def _next(now: Standing) -> Standing | None:
+    """One curve more, the noise sized again beside it, for a law sized beside a gap takes the gap for slip; None if
+    none is worth it."""
+    windows = now.data.windows
+    curve = strongest(now.data, now.fit, now.curves)
+    if curve is None:
+        return None
+    fit, curves = refit_with(now.data, now.fit, (*now.curves, curve))
+    responses = respond(np.exp(fit.vector[:2]), fit.linear.residual, windows)
+    law = size_noise(fit.linear.residual, fit.linear.starts, windows, responses, LIKELY)
+    there = _stands(windows, fit, curves, law)
+    fit, curves = refit_with(there.data, fit, curves)
+    return there._replace(fit=fit, curves=curves)
+
+
+def _stands(windows: Windows, fit: Solution, curves: tuple[Curve, ...], law: Law) -> Standing:
+    responses = respond(np.exp(fit.vector[:2]), fit.linear.residual, windows)
+    return Standing(fit, curves, law, Data(windows, whitener_of(law, windows, responses)))
+
+
+def strongest(data: Data, fit: Solution, curves: tuple[Curve, ...]) -> Curve | None:
+    """The curve that brings most beside some others, about a fit that has these; None if none is worth WORTH."""
+    responses = respond(np.exp(fit.vector[:2]), fit.linear.residual, data.windows)
+    base, prior = _base(data, fit, curves)
+    best, most = None, WORTH
+    for each in candidates(path_of(fit, data.windows, laws_from(curves)), responses):
+        if any(each.kind == curve.kind for curve in curves):
+            continue
+        bent = _beside(data, fit, base, prior, each.columns)
+        worth = min(bent.evidence - PRICE, bent.held_out)
+        if worth > most:
+            none = np.zeros(KNOTS)
+            most, best = worth, Curve(each.kind, each.at, none, none, bent.variance, each.density,
+                                      bent.evidence - PRICE, bent.held_out)  # fmt: skip
+    return best
+
+
+def _base(data: Data, fit: Solution, curves: tuple[Curve, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Whitened columns (windows, numbers, n) of a fit and its curves free of start states, the residual last, and the
+    products (n, n) that their priors add."""
+    linear = fit.linear
+    base = np.concatenate([linear.slopes, curve_columns(fit, data, curves), linear.residual[..., None]], axis=2)
+    whitened, _ = without_starts(data.whitener, base, linear.starts)
+    own, prior = len(fit.places), with_prior(np.zeros((whitened.shape[2],) * 2), fit.vector)
+    smooth, values = smoothness(curves), np.concatenate([np.zeros(0), *(curve.value for curve in curves)])
+    prior[own:-1, own:-1] += smooth
+    prior[own:-1, -1] -= smooth @ values
+    return whitened, prior
+
+
+def _beside(data: Data, fit: Solution, base: Array, prior: Array, columns: Array) -> Bent:
+    """What a curve of some columns brings beside a base."""
+    answers, _ = without_starts(data.whitener, columns, fit.linear.starts)
+    whole = np.concatenate([base[..., :-1], answers, base[..., -1:]], axis=2)
+    return bend(whole.transpose(0, 2, 1) @ whole, _spread_out(prior), KNOTS)
+
+
+def _spread_out(prior: Array) -> np.ndarray:
+    """A prior's products (n, n), the residual last, with KNOTS columns before the residual that it says nothing of."""
+    places = [*range(len(prior) - 1), len(prior) - 1 + KNOTS]
+    whole = np.zeros((len(prior) + KNOTS,) * 2)
+    whole[np.ix_(places, places)] = prior
+    return whole

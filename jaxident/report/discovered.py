@@ -1,0 +1,66 @@
+"""What a diagnosis discovered, in words and as a picture: laws that are in no catalogue."""
+
+from jaxident import plot
+from jaxident.diagnosis.account.discovered import Shown
+from jaxident.diagnosis.diagnose import Diagnosis
+from jaxident.effects.discovered import ACTS, SIGNALS
+from jaxident.report.page import Figure, Section, Table
+from jaxident.report.words import number, percent
+
+SIGNAL_WORDS = {
+    "v": "speed v", "w": "turn rate w", "heading": "heading", "x": "position x", "y": "position y",
+    "time": "session time", "push right": "push of the right wheel", "push left": "push of the left wheel",
+    "own speed": "speed of that wheel", "own push": "push of that wheel",
+}  # fmt: skip
+TIMES_WORDS = {"1": "", "v": "speed times ", "w": "turn rate times "}
+SEEN = (
+    "These laws are in no catalogue. They were found on the runs that fit, and runs that took no part in that confirm "
+    "them. Each adds a curve of one signal at one place. The corrected model has them, and every command obeys them. "
+    "Beyond the signals that these logs show, a curve stays at its last value: that is a guess."
+)
+CAPTION = (
+    "Line: the curve; shade: two standard deviations; below: how often the robot was there. What the nominal model has "
+    "itself (rates, gains) may be shared with it in another way, so that a straight line may be added to both."
+)
+
+
+def sentence(shown: Shown) -> str:
+    """One law in a sentence."""
+    law = shown.law
+    what = f"{TIMES_WORDS[law.times]}a curve of the {SIGNAL_WORDS[law.signal]}"
+    return f"the {law.acts_on} has {what} in it{_like(shown)}"
+
+
+def _like(shown: Shown) -> str:
+    """The closed form, if one explains the curve."""
+    form = shown.form
+    if form is None:
+        return ""
+    values = ", ".join(f"{key} = {number(value)}" for key, value in form.parameters.items())
+    return f"; {percent(form.part_explained)} of it looks like {form.form}, s the signal, {values}"
+
+
+def discovered(found: Diagnosis) -> list[Section]:
+    """The section on discovered laws; none where there are none."""
+    if not found.discovered:
+        return []
+    count = len(found.discovered)
+    figure, axes = plot.figure(size=(6.3, 2.1 * count), rows=count)
+    for ax, shown in zip(axes if count > 1 else [axes], found.discovered, strict=True):
+        law = shown.law
+        factor = {"1": "", "v": " per m/s", "w": " per rad/s"}[law.times]
+        unit = f"{ACTS[law.acts_on]}{factor}"
+        plot.discovered(law, shown.density, ax=ax, xlabel=f"{SIGNAL_WORDS[law.signal]} [{SIGNALS[law.signal]}]",
+                        ylabel=f"{law.acts_on}\n[{unit}]")  # fmt: skip
+    rows = [
+        (shown.law.acts_on, f"{TIMES_WORDS[shown.law.times]}a curve of the {SIGNAL_WORDS[shown.law.signal]}",
+         percent(shown.share), f"{shown.p_value:.2g}", _form(shown))
+        for shown in found.discovered
+    ]  # fmt: skip
+    table = Table(("acts on", "what is added", "share of the error", "probability by chance", "looks like"), rows)
+    return [Section("What was discovered", [SEEN, Figure(plot.image(figure), "Discovered curves", CAPTION), table])]
+
+
+def _form(shown: Shown) -> str:
+    form = shown.form
+    return "no simple form" if form is None else f"{form.form} ({percent(form.part_explained)})"

@@ -1,0 +1,134 @@
+"""The search for curves: the algebra on made Gram matrices, and whole searches on simulated robots."""
+
+import dataclasses
+
+import jax
+import numpy as np
+import pytest
+
+import jaxident as ji
+from jaxident.diagnosis.causes.finding import find_effects
+from jaxident.diagnosis.discovery.candidates import KINDS, Kind, hats
+from jaxident.diagnosis.discovery.curves import bend, solved
+from jaxident.diagnosis.discovery.fit import Curve, as_law
+from jaxident.diagnosis.discovery.forms import form_of
+from jaxident.diagnosis.discovery.search import discover
+from jaxident.diagnosis.prepare import prepare
+from jaxident.log import join, make_log
+from jaxident.robot.drive import Physical
+from jaxident.robot.model import Discovered, Model
+from jaxident.robot.noise import Noise
+
+KNOTS = 10
+AT = np.linspace(-1.0, 1.0, KNOTS)
+
+
+def test_hats_add_up_to_one_and_draw_the_curve():
+    s, value = np.linspace(-2.0, 2.0, 81), np.random.default_rng(0).normal(size=KNOTS)
+    weights = hats(s, AT)
+    np.testing.assert_allclose(weights.sum(axis=1), 1.0)
+    np.testing.assert_allclose(weights @ value, np.interp(s, AT, value), atol=1e-12)
+
+
+def windows_of(curve, rng, windows=40, rows=30):
+    """Products by window of one nominal column, the hats of a signal, and white noise plus a curve of it."""
+    s, nominal = rng.uniform(-1.0, 1.0, (windows, rows)), rng.normal(size=(windows, rows, 1))
+    y = 2.0 * nominal + curve(s)[..., None] + rng.normal(size=(windows, rows, 1))
+    whole = np.concatenate([nominal, hats(s, AT), y], axis=2)
+    return whole.transpose(0, 2, 1) @ whole
+
+
+def test_a_curve_in_the_data_is_found_and_its_values_are_near():
+    by_window = windows_of(lambda s: 0.5 * np.sin(3.0 * s), np.random.default_rng(1))
+    found = bend(by_window, np.zeros(by_window.shape[1:]), KNOTS)
+    assert found.evidence > 20.0
+    assert found.held_out > 20.0
+    values = solved(by_window.sum(axis=0), 1 + KNOTS)
+    assert abs(values[0] - 2.0) < 0.1
+    assert np.abs(values[1:] - 0.5 * np.sin(3.0 * AT)).max() < 0.4
+
+
+def test_noise_alone_brings_no_curve():
+    """Of 200 signals without any part in the data one in fifty may seem to be worth 2, none the 9 that are asked."""
+    found = [
+        bend(by_window, np.zeros(by_window.shape[1:]), KNOTS)
+        for by_window in (windows_of(np.zeros_like, np.random.default_rng(k), 12) for k in range(200))
+    ]
+    worth = np.array([min(one.evidence, one.held_out) for one in found])
+    assert np.mean(worth > 2.0) <= 0.02
+    assert worth.max() < 9.0
+
+
+def curve_of(kind: Kind, value) -> Curve:
+    return Curve(kind, AT, value, np.full(KNOTS, 0.01), 1.0, np.ones(KNOTS), 20.0, 20.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "form"),
+    [
+        (Kind("acceleration along", "v", "w"), 0.3 - 0.7 * np.abs(AT), "c |s|"),  # the rate takes the constant
+        (Kind("acceleration along", "1", "v"), 0.5 * AT - 2.0 * AT * np.abs(AT), "c s |s|"),
+        (Kind("speed sideways", "v", "w"), 0.1 * AT, "c s"),
+        (Kind("acceleration in heading", "1", "time"), 0.4 * (AT > 0.1), "c from s0 on"),
+        (Kind("pose ahead", "1", "heading"), 0.02 * np.sin(AT), "c s"),  # as good over so few radians
+    ],
+)
+def test_simple_forms_are_recognised(kind, value, form):
+    curve = curve_of(kind, value)
+    found = form_of(curve, as_law(curve))
+    assert found is not None
+    assert found.form == form
+    assert found.part_explained > 0.95
+
+
+def test_a_wild_curve_looks_like_nothing():
+    curve = curve_of(Kind("pose ahead", "1", "x"), np.cos(np.pi * np.arange(KNOTS)))
+    assert form_of(curve, as_law(curve)) is None
+
+
+def test_every_kind_can_be_run():
+    from jaxident.effects.discovered import check_discovered
+
+    for kind in KINDS:
+        check_discovered([Discovered(*kind, AT, AT)])
+        assert kind.site in ("actuation", "drive", "contact", "time", "camera")
+
+
+STEP, ROWS, RUNS = 1.0 / 30.0, 450, 6
+NOISE = Noise(3e-4, 2e-3, None, slip_along=0.004, slip_heading=0.02)
+ROBOT = Model(STEP, Physical(np.array([3.0, 5.0]), np.array([[0.8, 0.78], [9.0, -9.2]])), np.array([0.08, 0.1]), NOISE)
+
+
+def drive(model: Model, seed: int):
+    """Six runs of a robot with noise."""
+    rng, t, logs, passed = np.random.default_rng(seed), STEP * np.arange(ROWS), [], 0.0
+    for run in range(RUNS):
+        u = np.repeat(rng.uniform(-1.0, 1.0, (ROWS // 15, 2)), 15, axis=0)
+        log = make_log(t, u[:, 0], u[:, 1], *np.zeros((3, ROWS)))
+        logs.append(ji.simulate(model, log, key=jax.random.key(10 * seed + run), session_time=passed))
+        passed += t[-1]
+    return join(logs)
+
+
+def searched(model: Model, seed: int):
+    return discover(find_effects(prepare(drive(model, seed), None))[1])
+
+
+@pytest.mark.slow
+def test_a_speed_that_falls_with_the_square_of_the_turn_rate_is_discovered():
+    """The catalogue's turn loss goes with |w|, and no wheel knows w^2."""
+    at = np.linspace(-3.0, 3.0, 16)
+    law = Discovered("acceleration along", "v", "w", at, -0.25 * at**2)
+    found = searched(dataclasses.replace(ROBOT, discovered=(law,)), 1)
+    assert found
+    first = found[0].curves[0]
+    assert first.kind == Kind("acceleration along", "v", "w")
+    here = first.value - np.interp(0.0, first.at, first.value)  # the rate may take a constant
+    apart = np.abs(here + 0.25 * first.at**2)
+    assert np.all(apart < 4.0 * first.deviation)
+    assert apart.mean() < 0.2
+
+
+@pytest.mark.slow
+def test_robots_with_nothing_to_discover_have_no_curve():
+    assert [len(searched(ROBOT, seed)) for seed in range(2, 8)] == [0] * 6

@@ -1,0 +1,135 @@
+"""Discovered laws in both integrators, against effects and closed forms that do the same."""
+
+import dataclasses
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import jaxident as ji
+from jaxident.array_types import Pose
+from jaxident.effects.discovered import ACTS, MOST_KNOTS, MOST_LAWS, check_discovered, laws_of, shifted, with_laws
+from jaxident.errors import InputError
+from jaxident.log import make_log
+from jaxident.robot.drive import Physical
+from jaxident.robot.model import Discovered, Effect, Model
+
+STEP, ROWS = 0.04, 200
+ROBOT = Model(STEP, Physical(np.array([3.0, 5.0]), np.array([[0.8, 0.78], [9.0, -9.2]])), np.array([0.08, 0.1]))
+TURNS, PUSHES = np.linspace(-4.0, 4.0, 9), np.linspace(-1.0, 1.0, 9)
+
+
+def drive():
+    """A log of both wheels at many levels."""
+    rng, t = np.random.default_rng(3), STEP * np.arange(ROWS)
+    u = np.repeat(rng.uniform(-1.0, 1.0, (ROWS // 10, 2)), 10, axis=0)
+    return make_log(t, u[:, 0], u[:, 1], *np.zeros((3, ROWS)))
+
+
+def with_law(*law) -> Model:
+    return dataclasses.replace(ROBOT, discovered=(Discovered(*law),))
+
+
+LAWS = (
+    ("acceleration along", "v", "w", TURNS, -0.5 * np.abs(TURNS)),
+    ("acceleration in heading", "1", "time", np.linspace(0.0, 8.0, 9), np.linspace(0.0, 3.0, 9)),
+    ("speed sideways", "v", "w", TURNS, 0.05 * TURNS),
+    ("push of each wheel", "1", "own push", PUSHES, 0.2 * PUSHES**3),
+    ("push of each wheel", "1", "own speed", PUSHES, -0.2 * PUSHES * np.abs(PUSHES)),
+    ("pose ahead", "1", "x", PUSHES, 0.1 * PUSHES**2),
+    ("pose to the left", "1", "heading", TURNS[1:-1], 0.03 * np.sin(TURNS[1:-1])),
+    ("reported heading", "1", "y", PUSHES, 0.1 * PUSHES),
+)
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: f"{law[0]} by {law[2]}")
+def test_a_robot_with_a_law_is_predicted_by_its_own_model_alone(law):
+    """The full integrator drives, the fast one predicts; without the law the prediction is at least ten times worse."""
+    model = with_law(*law)
+    seen = ji.simulate(model, drive())
+    own, without = (ends_apart(each, seen) for each in (model, ROBOT))
+    assert own < 0.1 * without, (own, without)
+
+
+def ends_apart(model: Model, log) -> float:
+    found = ji.predict(model, log, 20)
+    last = np.flatnonzero(found.step == 20)
+    rows = found.start[last] + 20
+    apart = [np.asarray(column)[last] - np.asarray(getattr(log, name))[rows] for name, column in (
+        ("x", found.x), ("y", found.y), ("theta", found.theta))]  # fmt: skip
+    apart[2] = (apart[2] + np.pi) % (2.0 * np.pi) - np.pi
+    return float(np.sqrt(np.mean(np.square(apart))))
+
+
+def test_a_law_that_does_what_an_effect_does_moves_the_robot_as_the_effect():
+    loss = 0.5
+    as_effect = dataclasses.replace(ROBOT, effects=(Effect("turn_loss", {"loss": loss}),))
+    plain, law, effect = (
+        ji.simulate(each, drive())
+        for each in (ROBOT, with_law("acceleration along", "v", "w", TURNS, -loss * np.abs(TURNS)), as_effect)
+    )
+    moved = np.abs(np.asarray(effect.x) - np.asarray(plain.x)).max()
+    assert np.abs(np.asarray(law.x) - np.asarray(effect.x)).max() < 0.02 * moved
+
+
+def test_a_straight_line_of_the_wheels_push_is_a_larger_gain():
+    louder = dataclasses.replace(ROBOT, dynamics=ROBOT.dynamics._replace(gain=1.2 * ROBOT.dynamics.gain))
+    wide = 2.0 * PUSHES
+    law = ji.simulate(with_law("push of each wheel", "1", "own push", wide, 0.2 * wide), drive())
+    np.testing.assert_allclose(law.x, ji.simulate(louder, drive()).x, atol=1e-7)
+
+
+def test_commands_in_another_unit_move_the_robot_alike():
+    """A law in the user's unit and the same for commands over the largest."""
+    given = Discovered("push of each wheel", "1", "own push", 100.0 * PUSHES, 20.0 * PUSHES**3)
+    mine = Discovered("push of each wheel", "1", "own push", PUSHES, 0.2 * PUSHES**3)
+    for one, other in zip(laws_of([given], 100.0), laws_of([mine]), strict=True):
+        np.testing.assert_allclose(one, other)
+
+
+def test_a_curve_is_straight_between_its_knots_and_constant_beyond():
+    at, value = np.array([-1.0, 0.0, 2.0]), np.array([1.0, 3.0, -1.0])
+    settings = with_laws({}, laws_of([Discovered("reported heading", "1", "x", at, value)]))
+    x = jnp.array([-9.0, -1.0, -0.5, 0.0, 0.5, 2.0, 9.0])
+    pose = Pose(x, jnp.zeros_like(x), jnp.zeros_like(x))
+    np.testing.assert_allclose(shifted(settings, pose, pose).theta, np.interp(x, at, value))
+
+
+def test_the_file_of_a_model_with_a_law_reads_back(tmp_path):
+    law = Discovered("speed sideways", "v", "w", TURNS, 0.05 * TURNS, 0.01 * np.ones(9))
+    ji.save_model(dataclasses.replace(ROBOT, discovered=(law,)), tmp_path / "model.json")
+    (back,) = ji.load_model(tmp_path / "model.json").discovered
+    assert (back.acts_on, back.times, back.signal) == ("speed sideways", "v", "w")
+    for one, other in ((back.at, law.at), (back.value, law.value), (back.standard_deviation, law.standard_deviation)):
+        np.testing.assert_array_equal(one, other)
+
+
+GOOD = {"acts_on": "acceleration along", "times": "1", "signal": "v", "at": TURNS, "value": TURNS}
+BAD = (
+    ({"acts_on": "acceleration up"}, "acts_on is 'acceleration up'"),
+    ({"signal": "weather"}, "signal is 'weather'"),
+    ({"times": "u"}, "times is 'u'"),
+    ({"at": TURNS[::-1]}, "knots are out of order"),
+    ({"value": TURNS[1:]}, "9 knots and 8 values"),
+    ({"value": np.full(9, np.nan)}, "not finite"),
+    ({"at": TURNS[:1], "value": TURNS[:1]}, "1 knots"),
+    ({"at": np.arange(99.0), "value": np.zeros(99)}, f"2 to {MOST_KNOTS}"),
+    ({"acts_on": "pose ahead"}, "error of the camera"),
+    ({"acts_on": "push of each wheel"}, "push of each wheel"),
+    ({"signal": "own push"}, "push of each wheel"),
+)
+
+
+@pytest.mark.parametrize(("change", "words"), BAD, ids=lambda value: str(value)[:30])
+def test_a_law_that_no_program_can_run_is_refused(change, words):
+    with pytest.raises(InputError, match=words):
+        check_discovered([Discovered(**{**GOOD, **change})])
+
+
+def test_too_many_laws_are_refused():
+    with pytest.raises(InputError, match=f"at most {MOST_LAWS}"):
+        check_discovered([Discovered(**GOOD)] * (MOST_LAWS + 1))
+
+
+def test_every_place_has_a_law_that_was_tried():
+    assert {law[0] for law in LAWS} == set(ACTS)
