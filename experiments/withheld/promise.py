@@ -2,9 +2,10 @@
 
     python -m experiments.withheld.promise --cases CASES --answers ANSWERS --found FOUND --out PROMISE.json
 
-`gap.discovered` is the mean squared pose error of the corrected model over the camera's variance on runs that served nothing
-else. The same is taken of `jaxident predict corrected_model.json` on those runs (2 and 5 of six), and on four fresh
-runs of the hidden robot with noise, slip and chance, whose session goes on where the logs ended. Answers must be plain.
+`gap.discovered` is the mean squared pose error of the corrected model over the camera's variance on runs that served
+nothing else. The same is taken of `jaxident predict corrected_model.json` on those runs (2 and 5 of six), and on four
+fresh runs of the hidden robot with noise, slip and chance, whose session goes on where the logs ended. Answers must be
+plain.
 """
 
 import argparse

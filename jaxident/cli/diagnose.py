@@ -119,7 +119,7 @@ def _gap(found) -> str:
     names = [*given, ("refitted", "nominal, parameters refitted" if given else "nominal", gap.refitted)]
     last = [("after", "with named effects" if found.discovered else "corrected", gap.after)]
     if found.discovered:
-        last.append(("discovered", "with discovered laws", gap.discovered))
+        last = [*(last if found.selected else []), ("discovered", "with discovered laws", gap.discovered)]
     for key, name, level in (*names, *last, ("floor", "noise alone", gap.floor)):
         rows.append((name, plain_text(error(rms[key])), f"{level:.3g}"))
     lines = f"root mean square error {gap.horizon:.3g} s ahead\n{table(rows)}"
@@ -127,4 +127,9 @@ def _gap(found) -> str:
         return lines
     low, high = gap.shrink.interval
     told = f"{100 * gap.shrink.value:.0f} % ({100 * low:.0f} to {100 * high:.0f} %, 90 % interval)"
-    return f"{lines}\nof the error beyond noise the corrected model takes away {told}"
+    if not found.discovered:
+        return f"{lines}\nof the error beyond noise the corrected model takes away {told}"
+    whole = 1.0 - (gap.discovered - gap.floor) / (gap.refitted - gap.floor)
+    return (
+        f"{lines}\nof the error beyond noise named effects take away {told}; with discovered laws {100 * whole:.0f} %"
+    )

@@ -106,8 +106,8 @@ def diagnose(
     verdict = decide(prepared, judgement, selected, parameters)
     nominal = to_model(prepared, finding.nominal.vector, finding.law, (), None, finding.nominal)
     return Diagnosis(verdict, judgement, gap, account, where, selected, parameters, visible(known),
-                     replay(known, seed), advice(verdict, judgement), nominal, corrected, shrinks, prepared, finding,
-                     surplus, simulator, laws)  # fmt: skip
+                     replay(known, seed), advice(verdict, judgement, laws), nominal, corrected, shrinks, prepared,
+                     finding, surplus, simulator, laws)  # fmt: skip
 
 
 def check_nominal(logs: Log | Sequence[Log], sim: Log | Sequence[Log] | None, model: Model | None) -> None:
@@ -159,7 +159,7 @@ def decide(prepared: Prepared, judgement: Judgement, selected: tuple[str, ...], 
     return "parameters" if moved else "no_gap"
 
 
-def advice(verdict: str, judgement: Judgement) -> str:
+def advice(verdict: str, judgement: Judgement, laws: tuple[Shown, ...] = ()) -> str:
     """What to record next, in a sentence."""
     if verdict == "undecided":
         return "Record at least three runs of 500 samples with both wheels at many levels, forward and backward."
@@ -168,6 +168,10 @@ def advice(verdict: str, judgement: Judgement) -> str:
         names = ",".join((sets[0].effect, sets[0].indistinguishable_from[0]))
         told = names.replace(",", " from ")
         return f"This input cannot tell {told}: record the one that `jaxident plan MODEL --between {names}` designs."
+    if verdict in ("unknown", "partly") and laws:
+        signal = laws[0].law.signal
+        begin = "Ask what on the robot could make the discovered curve."
+        return f"{begin} Runs over a wider range of {signal} would sharpen it."
     if verdict in ("unknown", "partly"):
         return "No effect of the catalogue explains what is left: record runs that stay in the regions where it lies."
     return "Nothing more is needed for this question; a longer log would find fainter effects."
