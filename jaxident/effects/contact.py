@@ -150,7 +150,7 @@ RECORDS = (
                       lambda _: [{}, {"inverse_square": 2.0, "dry": 1.0, "spin": 0.02}]),
     ),
     EffectRecord(
-        name="lateral_slip", site="contact", stage="side", step=statements.LATERAL,
+        name="lateral_slip", site="contact", stage="side", step=statements.LATERAL, quantity="side slip",
         words="the robot drifts outwards in curves",
         equation="sideways speed -c v w",
         source="Wong 2008, Theory of Ground Vehicles, ch. 5 (cornering stiffness)",
@@ -159,7 +159,7 @@ RECORDS = (
         search=Search((signed("slip", 0.5),), on_speeds=True),
     ),
     EffectRecord(
-        name="slope", site="contact", stage="body", step=statements.SLOPE, quantity="slope",
+        name="slope", site="contact", stage="body", step=statements.SLOPE, quantity="tilted floor",
         words="the floor is not level",
         equation="v' += g cos(theta - theta_0)",
         source="gravity on a tilted floor: 0.1 m/s^2 is 0.6 degrees",
