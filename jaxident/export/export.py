@@ -5,11 +5,12 @@ import pathlib
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.checks import check_effects
 from jaxident.errors import InputError
 from jaxident.export import c_header, gap, gazebo, isaac, mjcf, python, robot_localization, ros2_control, table
 from jaxident.export.ask import Ask, assumed, check, largest_command, reach, unused
-from jaxident.export.split import WRAPPER, Part, Target, inside_wrapper, split
+from jaxident.export.split import WRAPPER, Part, Target, inside_wrapper, split, values_of
 from jaxident.export.wheels import MASS, Robot, robot_of
 from jaxident.files.atomic import check_target, write_text
 from jaxident.files.models import load_model
@@ -24,6 +25,9 @@ COMMANDS_FILE = "_commands.py"
 """What the wrapper's name ends in, after the name of the export without its suffix."""
 ORDINARY_COMMAND = 1.0
 """Largest command of the default input where nobody tells one."""
+
+LONGEST_DELAY = 100.0
+"""[s]; the longest range of the catalogue is 0.3 s."""
 
 USE = {
     "mjcf": "Wrapper for MuJoCo: before each mj_step, robot.step(u_r, u_l, timestep) and ctrl = robot.m_r, robot.m_l.",
@@ -89,6 +93,7 @@ def commands_path(path: str | os.PathLike) -> pathlib.Path:
 
 def _made(model: Model, target: Target, ask: Ask, diagnosis, path) -> Export:
     _check_physical(model, target)
+    _check_delays(model)
     robot = robot_of(model, MASS if ask.mass is None else ask.mass, ask.wheel_radius) if target.needs_wheels else None
     parts = split(model, target, coupled=robot is None or robot.coupled)
     text = _text(model, target.name, ask, parts, robot, path)
@@ -115,6 +120,17 @@ def _check_physical(model: Model, target: Target) -> None:
         )
     if model.physical is None and model.effects:
         raise InputError("physical: null; a model of free numerators takes no effects")
+
+
+def _check_delays(model: Model) -> None:
+    """InputError for commands that come so late that no export can keep all that are under way."""
+    for effect in model.effects:
+        record = CATALOGUE[effect.name]
+        late = values_of(effect)[record.parameters[0].name]
+        if record.stage == "arrival" and late > LONGEST_DELAY:
+            raise InputError(
+                f"effect {effect.name!r}: {late:g} s; an export keeps commands for {LONGEST_DELAY:g} s at most"
+            )
 
 
 def _text(model: Model, to: str, ask: Ask, parts: list[Part], robot: Robot | None, path) -> str:

@@ -31,6 +31,7 @@ GRIP = 3.0
 """Coefficient of friction of the wheels: they do not slide, as in a model without slip."""
 GRASP = 1.8
 """Damping of slip at the wheels, in 1 / timestep: little creep, still stable."""
+DELAY_NOTE = "The delay of the actuators needs MuJoCo 3.5 or later."
 STIFF, CLOSE = "0.002 1", "0.95 0.99 0.0005"
 """solref and solimp of the contacts: a time constant of two steps, a tenth of a millimetre deep."""
 
@@ -46,7 +47,8 @@ def write(model: Model, parts: list[Part], robot: Robot) -> str:
     fields = {part.name for part in parts if part.effect and part.how == FIELD}
     values = {CATALOGUE[one.name].quantity: values_of(one) for one in model.effects if one.name in fields}
     body, step = body_of(robot), timestep(model)
-    head = "\n".join(f"     {line}" for line in (*origin(model), "ctrl: pushes of the right and the left wheel."))
+    notes = ["ctrl: pushes of the right and the left wheel.", *([DELAY_NOTE] if "delay" in values else [])]
+    head = "\n".join(f"     {line}" for line in (*origin(model), *notes))
     wheels = "".join(_wheel(robot, body, side, values) for side in ("right", "left"))
     motors = "".join(_motor(model, robot, side, values, step) for side in ("right", "left"))
     tyres = "".join(_tyre(side, step) for side in ("right", "left"))

@@ -11,8 +11,9 @@ from string import Template
 import numpy as np
 
 from jaxident.errors import InputError
-from jaxident.export import python_templates as templates
 from jaxident.export.code import PYTHON, block, constants, difference_constants, laws, substeps
+from jaxident.export.python_difference import DIFFERENCE
+from jaxident.export.python_templates import PHYSICAL
 from jaxident.export.split import COUPLING, DEAD_ZONE, EVERY, GAIN, RATE, Target
 from jaxident.export.text import number, origin
 from jaxident.robot.drive import Physical
@@ -33,7 +34,7 @@ def write(model: Model, effects: Iterable[Effect], head: str = "", period: float
     lines = "\n".join(filter(None, (head, *origin(model))))
     check_gain(model)
     if not isinstance(model.dynamics, Physical):
-        return Template(templates.DIFFERENCE).substitute(difference_constants(model), HEAD=lines)
+        return Template(DIFFERENCE).substitute(difference_constants(model), HEAD=lines)
     chosen = tuple(effects)
     found = laws(chosen, PYTHON)
     indents = {stage: 4 if stage in IN_FUNCTIONS else 8 for stage in found.stages}
@@ -42,11 +43,14 @@ def write(model: Model, effects: Iterable[Effect], head: str = "", period: float
     words["ROUNDS"] = "3" if found.stages["friction"] else "1"
     step = float(model.sample_period) if period is None else period
     words |= {"PERIOD": number(step), "SUBSTEPS": str(substeps(model, model.dynamics, chosen, step))}
-    return Template(templates.PHYSICAL).substitute(constants(model, model.dynamics) | words, HEAD=lines)
+    return Template(PHYSICAL).substitute(constants(model, model.dynamics) | words, HEAD=lines)
 
 
 def check_gain(model: Model) -> None:
-    """InputError where two wheels do the same, so that no command can be computed for a wanted motion."""
+    """InputError where two wheels do the same, or speeds never come to rest, so that no command can be computed for a
+    wanted motion."""
+    if model.physical is None and not np.all(np.abs(np.asarray(model.difference.alpha)) < 1.0):
+        raise InputError(f"alpha: is {np.asarray(model.difference.alpha).tolist()}; an export needs poles below 1")
     matrix = np.asarray(model.physical.gain if model.physical else model.difference.delta - model.difference.epsilon)
     if not np.isfinite(matrix).all() or np.linalg.cond(matrix) > 1e12:
         raise InputError("gain: both wheels do the same; an export needs a robot that can drive and turn")

@@ -18,6 +18,9 @@ FIELD, WRAPPER, LOST = "field", "wrapper", "not carried"
 GAIN, RATE, COUPLING, DEAD_ZONE = "gain", "rate", "coupling", "dead zone"
 CAMERA, SLIP = "camera noise", "random slip"
 
+ANY = "*"
+"""Quantity of a target's field that takes every effect."""
+
 COMMANDS = frozenset(INPUT)
 """Stages of a wrapper that hands on the pushes of the wheels."""
 DRIVE = COMMANDS | frozenset(MOTION)
@@ -104,6 +107,8 @@ def _nominal(name: str, model: Model, target: Target) -> Part:
 
 def _effect(effect: Effect, model: Model, target: Target) -> Part:
     record, values = CATALOGUE[effect.name], values_of(effect)
+    if ANY in target.fields:
+        return Part(effect.name, FIELD, target.fields[ANY], effect=True)
     if record.quantity in target.fields and _alone(effect, model, target):
         return Part(effect.name, FIELD, target.fields[record.quantity], effect=True)
     if record.chance is not None:

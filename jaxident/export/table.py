@@ -8,12 +8,12 @@ import numpy as np
 
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.effect import UNIT
-from jaxident.export.split import CAMERA, COUPLING, DEAD_ZONE, EVERY, GAIN, RATE, SLIP, Target
+from jaxident.export.split import ANY, CAMERA, COUPLING, DEAD_ZONE, EVERY, GAIN, RATE, SLIP, Target
 from jaxident.export.text import number, origin
 from jaxident.robot.model import Model
 
 TARGET = Target(
-    "table", "the table", dict.fromkeys((GAIN, RATE, COUPLING, DEAD_ZONE, CAMERA, SLIP), "a row for each number"),
+    "table", "the table", dict.fromkeys((GAIN, RATE, COUPLING, DEAD_ZONE, CAMERA, SLIP, ANY), "a row for each number"),
     stages=EVERY, inside=True,
 )  # fmt: skip
 HEADER = ("part", "number", "value", "unit", "standard deviation", "determined")

@@ -138,6 +138,12 @@ def test_wheels_that_do_the_same_are_refused():
         python.write(same, ())
 
 
+def test_difference_equations_that_never_come_to_rest_are_refused():
+    difference = PLAIN.difference._replace(alpha=np.array([1.0, 0.5]))
+    with pytest.raises(InputError, match="poles below 1"):
+        c_header.write(dataclasses.replace(PLAIN, dynamics=difference), ())
+
+
 def test_numbers_that_are_not_finite_are_refused():
     broken = dataclasses.replace(PLAIN, dead_zone=np.array([np.nan, 0.1]))
     with pytest.raises(InputError, match="finite"):

@@ -192,7 +192,9 @@ def test_the_table_holds_every_number_with_its_deviation():
     assert rows["transport_delay", "delay"] == ["0.05", "s", "0.001", "from the prior"]
     assert rows["noise", "slip_heading"][:2] == ["0.3", "rad/s^1.5"]
     assert {len(row) for row in cells} == {6}
-    assert {ways(made)[part] for part in ways(made)} == {"field"}
+    assert set(ways(made).values()) == {"field"}
+    assert set(ways(ji.export(with_one("lost_commands", probability=0.1), "table")).values()) == {"field"}
+    assert ways(ji.export(with_one("lost_commands", probability=0.1), "python"))["lost_commands"] == "not carried"
 
 
 def test_the_table_as_csv_and_without_deviations(tmp_path):
@@ -245,6 +247,12 @@ def test_a_limit_before_what_mixes_wheels_stands_in_the_wrapper():
 def test_sizes_that_make_no_sense_are_refused(limit):
     with pytest.raises(InputError, match="limit"):
         ji.export(PLAIN, "gazebo", limit=limit)
+
+
+def test_commands_that_come_minutes_late_are_refused():
+    for target in ("c-header", "mjcf"):
+        with pytest.raises(InputError, match="100 s at most"):
+            ji.export(with_one("transport_delay", delay=1e9), target)
 
 
 def test_unknown_targets_and_units_are_refused():
