@@ -18,7 +18,9 @@ import numpy as np
 import jaxident as ji
 from jaxident.effects.apply import with_effects
 from jaxident.effects.catalogue import CATALOGUE
+from jaxident.export.export import TARGETS
 from jaxident.export.gap import apart
+from jaxident.export.split import split
 from jaxident.robot.drive import Physical
 
 PERIOD, ROWS, HOLD = 0.03, 300, 12
@@ -26,6 +28,7 @@ DRIVE = Physical(np.array([4.0, 6.0]), np.array([[1.2, 1.1], [9.0, -8.5]]), np.a
 ROBOT = ji.Model(PERIOD, DRIVE, np.array([0.1, 0.12]))
 """A small robot: a track of 395 mm, 0.57 m/s per unit of command at each wheel, time constants 0.25 and 0.17 s."""
 NOISE = ji.Noise(position=5e-4, heading=2e-3)
+SHORT = {"not carried": ""}
 SETTLE = 0.3
 """Seconds in which the engine's robot comes to rest on its wheels before the log begins."""
 
@@ -100,6 +103,16 @@ def one_effect(name: str) -> tuple[str, str, float, float]:
     return name, how, away(drive(plain, u, PERIOD), true), away(drive(made, u, PERIOD), true)
 
 
+def carried() -> list[str]:
+    """Rows of a table: how each target carries each effect at its typical size."""
+    lines = [f"| effect | {' | '.join(TARGETS)} |", "|---|" + "---|" * len(TARGETS)]
+    for name, record in CATALOGUE.items():
+        model = with_effects(ROBOT, [(name, record.typical(PERIOD * ROWS))])
+        ways = [next(part.how for part in split(model, one) if part.name == name) for one in TARGETS.values()]
+        lines.append(f"| {name} | {' | '.join(SHORT.get(way, way) for way in ways)} |")
+    return lines
+
+
 def main() -> None:
     """Print and write the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -119,6 +132,7 @@ def main() -> None:
         effect, how, before, after = one_effect(name)
         lines.append(f"| {effect} | {how} | {before:.2f} | {after:.2f} | {100.0 * (1.0 - after / before):.0f} % |")
         print(lines[-1], flush=True)
+    lines += ["", "What each target carries in a field and in the commands' wrapper:", "", *carried()]
     options.out.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 

@@ -18,13 +18,12 @@ from jaxident.export.split import COUPLING, DEAD_ZONE, LOST, RATE, SLIP, Part
 from jaxident.files.json_text import read_json
 from jaxident.log import Log, make_log
 from jaxident.robot.drive import Physical
-from jaxident.robot.excitation import multilevel
 from jaxident.robot.model import Model
 
 HORIZON = 1.0
 """Seconds ahead at which the two are compared, as in the account of a diagnosis."""
 ROWS, HOLD = 600, 20
-"""Rows of the default input, and rows that each of its levels lasts."""
+"""Rows of the default input, and rows that each of its levels lasts; NumPy draws them, the same in any precision."""
 AT_ONCE = 30.0
 """A robot without rates reaches its speed this many times faster."""
 
@@ -86,12 +85,11 @@ def _without(model: Model, part: Part) -> Model | None:
 
 def _run(model: Model, largest: float) -> np.ndarray:
     """Poses (ROWS, 3) of the model on the default input, without noise; effects of chance draw from one key."""
-    key = jax.random.key(0)
-    command = multilevel(key, ROWS, largest, HOLD)
-    t = float(model.sample_period) * np.arange(ROWS)
-    log = make_log(t, np.asarray(command.right), np.asarray(command.left))
+    levels = np.random.default_rng(0).uniform(-largest, largest, (-(-ROWS // HOLD), 2))
+    right, left = np.repeat(levels, HOLD, axis=0)[:ROWS].T
+    log = make_log(float(model.sample_period) * np.arange(ROWS), right, left)
     quiet = dataclasses.replace(model, noise=None)
-    return _poses(simulate(quiet, log, key=key if is_random(quiet) else None))
+    return _poses(simulate(quiet, log, key=jax.random.key(0) if is_random(quiet) else None))
 
 
 def _poses(log: Log) -> np.ndarray:
