@@ -10,6 +10,7 @@ from export_gap import PERIOD, ROBOT, away, commands, drive, identified, truth
 
 import jaxident as ji
 from jaxident.effects.apply import with_effects
+from jaxident.robot.drive import Physical
 
 
 def test_an_identified_robot_in_mujoco_is_as_near_to_the_truth_as_its_model():
@@ -33,6 +34,19 @@ def test_effects_with_a_field_or_a_wrapper_close_the_gap(effects):
     true = truth(model, u)
     assert away(drive(ji.export(ROBOT, "mjcf"), u, PERIOD), true) > 10.0
     assert away(drive(ji.export(model, "mjcf"), u, PERIOD), true) < 1.0
+
+
+@pytest.mark.parametrize(
+    ("rate", "gain"),
+    [([14.0, 22.0], [[7.1, 6.9], [90.0, -88.0]]), ([1.6, 0.5], [[1.5, 1.4], [2.2, -2.1]])],
+    ids=["strong", "slow"],
+)
+def test_strong_and_slow_robots_neither_slide_nor_tip(rate, gain):
+    """Accelerations of 14 m/s^2 and time constants of 2 s."""
+    model, u = ji.Model(PERIOD, Physical(np.array(rate), np.array(gain)), np.array([0.1, 0.1])), commands(4)[:120]
+    true = truth(model, u)
+    assert away(drive(ji.export(model, "mjcf"), u, PERIOD), true) < 1.0
+    assert np.ptp(true[:, :2]) > 0.1
 
 
 def test_the_published_robot_and_sizes_that_no_path_depends_on():
