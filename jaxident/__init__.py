@@ -50,6 +50,7 @@ _ROOMS = {
     "joint_filter": "jaxident.estimation.joint_filter",
     "effects": "jaxident.effects",
     "study": "jaxident.study",
+    "export": "jaxident.export",
     "plot": "jaxident.plot",
 }
 

@@ -15,13 +15,13 @@ FLOORS = (
     ("effects",),
     ("estimation",),
     ("study", "diagnosis"),
-    ("files", "plot", "report"),
+    ("files", "plot", "report", "export"),
     ("",),  # the package's own file of public names
     ("cli",),
     ("__main__",),
 )
-SIDEWAYS = {("report", "plot"), ("report", "files"), ("plot", "files")}
-"""Importer and imported within a floor: files, plot and report stand side by side, in that order."""
+SIDEWAYS = {("report", "plot"), ("report", "files"), ("plot", "files"), ("export", "files")}
+"""Importer and imported within a floor: files, plot, report and export stand side by side."""
 FLOOR_OF = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
 UPSTAIRS = 5
 """The lowest floor that may print and draw."""

@@ -5,6 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxident.array_types import Array, Wheels
+from jaxident.effects import statements
 from jaxident.effects.commands import (
     command_polling,
     input_quantisation,
@@ -78,7 +79,7 @@ def _twists(_: float) -> list[dict[str, float]]:
 
 RECORDS = (
     EffectRecord(
-        name="asymmetric_dead_zone", site="actuation", stage="zone",
+        name="asymmetric_dead_zone", site="actuation", stage="zone", step=statements.ASYMMETRIC_ZONE,
         words="a wheel's dead zone is wider in one direction than in the other",
         equation="D = D0 + a for u > 0, D0 - a for u < 0",
         source="Tao, Kokotovic 1996, Adaptive Control of Systems with Actuator Nonlinearities, ch. 2",
@@ -88,7 +89,7 @@ RECORDS = (
         search=Search((signed("right", 0.5), signed("left", 0.5))),
     ),
     EffectRecord(
-        name="direction_gain", site="actuation", stage="motor",
+        name="direction_gain", site="actuation", stage="motor", step=statements.DIRECTION,
         words="a wheel turns faster in one direction than in the other",
         equation="m -> (1 + g sign m) m",
         source="brush timing of motors; Borenstein, Everett, Feng 1996, Where am I?",
@@ -98,7 +99,7 @@ RECORDS = (
         search=Search((signed("right", 0.7), signed("left", 0.7))),
     ),
     EffectRecord(
-        name="input_saturation", site="actuation", stage="command",
+        name="input_saturation", site="actuation", stage="command", step=statements.SATURATION, quantity="saturation",
         words="commands beyond a level have no further effect",
         equation="u -> clip(u, -s, s)",
         source="Franklin, Powell, Emami-Naeini, Feedback Control, ch. 9",
@@ -109,7 +110,7 @@ RECORDS = (
                       seeds=lambda _: [{"level": level} for level in (0.9, 0.75, 0.6, 0.45, 0.3)]),
     ),
     EffectRecord(
-        name="input_quantisation", site="actuation", stage="command",
+        name="input_quantisation", site="actuation", stage="command", step=statements.QUANTISATION,
         words="commands act in steps",
         equation="u -> q round(u / q)",
         source="Widrow, Kollar 2008, Quantization Noise",
@@ -120,7 +121,7 @@ RECORDS = (
                       suggested=Suggested("steps", lambda step: {"step": float(step)})),
     ),
     EffectRecord(
-        name="input_rate_limit", site="actuation", stage="slew",
+        name="input_rate_limit", site="actuation", stage="slew", step=statements.RATE_LIMIT,
         words="commands can change only so fast",
         equation="|u'| <= R",
         source="slew limit of motor drivers; Franklin, Powell, Emami-Naeini, ch. 9",
@@ -134,7 +135,7 @@ RECORDS = (
                       lambda _: [{"inverse_rate": inverse} for inverse in (0.03, 0.07, 0.15, 0.3, 0.6)]),
     ),
     EffectRecord(
-        name="transport_delay", site="actuation", stage="arrival",
+        name="transport_delay", site="actuation", stage="arrival", step=statements.DELAY, quantity="delay",
         words="commands act late, or the camera reports late",
         equation="u(t) -> u(t - T)",
         source="radio, computing and camera latency; Astrom, Murray, Feedback Systems, ch. 10",
@@ -144,7 +145,7 @@ RECORDS = (
         search=Search((positive("delay", 0.5),)),
     ),
     EffectRecord(
-        name="motor_lag", site="actuation", stage="gear",
+        name="motor_lag", site="actuation", stage="gear", step=statements.LAG, quantity="lag",
         words="the motors take time to follow",
         equation="q' = (m - q) / tau, gain q in place of gain m",
         source="inductance and speed loop; Franklin, Powell, Emami-Naeini, ch. 2",
@@ -154,7 +155,7 @@ RECORDS = (
         search=Search((positive("time_constant", 0.5),)),
     ),
     EffectRecord(
-        name="backlash", site="actuation", stage="gear",
+        name="backlash", site="actuation", stage="gear", step=statements.PLAY,
         words="play in the gears, crossed whenever the push turns round",
         equation="p' = m - c n, |p| <= b / 2: where it touches neither side, c n in place of m",
         source="Nordin, Gutman 2002, Controlling mechanical systems with backlash, Automatica 38",
@@ -168,7 +169,7 @@ RECORDS = (
                       seeds=lambda _: [{}, {"right": 0.02, "left": 0.02, "coasting": 1.0}]),
     ),
     EffectRecord(
-        name="supply_sag", site="actuation", stage="motor",
+        name="supply_sag", site="actuation", stage="motor", step=statements.SAG,
         words="the supply gives way when both motors draw",
         equation="m -> m / (1 + s (|u_r| + |u_l|))",
         source="inner resistance of batteries; Plett 2015, Battery Management Systems, ch. 2",
@@ -189,7 +190,7 @@ RECORDS = (
         chance=Chance("lost", keys=(0,)),
     ),
     EffectRecord(
-        name="command_polling", site="actuation", stage="arrival",
+        name="command_polling", site="actuation", stage="arrival", step=statements.POLLING,
         words="the base reads its commands now and then: each acts from the next reading on",
         equation="u(t) -> u(t_k) from t_k = (k + phi) P on, t_k >= t the first such moment of session time",
         source="buses and radios with frames of their own; Nilsson, Bernhardsson, Wittenmark 1998, Automatica 34",
@@ -202,7 +203,7 @@ RECORDS = (
                       seeds=_polls),
     ),
     EffectRecord(
-        name="twist_quantisation", site="actuation", stage="command",
+        name="twist_quantisation", site="actuation", stage="command", step=statements.TWIST,
         words="the base is told speed and turn rate in whole steps",
         equation="(u_r + u_l) / 2 -> q_v round((u_r + u_l) / (2 q_v)), u_r - u_l -> q_w round((u_r - u_l) / q_w)",
         source="Widrow, Kollar 2008, Quantization Noise; iRobot Create Open Interface (whole mm/s)",

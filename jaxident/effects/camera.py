@@ -5,6 +5,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array, Pose
+from jaxident.effects import statements
 from jaxident.effects.effect import (
     ALONG,
     EVERYWHERE,
@@ -117,7 +118,7 @@ def _chances(key, count: int) -> Array:
 
 RECORDS = (
     EffectRecord(
-        name="marker_offset", site="camera", stage="optics",
+        name="marker_offset", site="camera", stage="optics", step=statements.MARKER, quantity="marker place",
         words="the tracked marker is not on the axle's centre",
         equation="[x, y] += R(theta) [a, b]",
         source="rigid body kinematics; Borenstein, Everett, Feng 1996",
@@ -127,7 +128,7 @@ RECORDS = (
         search=Search((signed("ahead", 0.3), signed("left", 0.3, silent=True, unseen=True))),
     ),
     EffectRecord(
-        name="heading_offset", site="camera", stage="optics",
+        name="heading_offset", site="camera", stage="optics", step=statements.TURNED, quantity="marker turn",
         words="the reported heading is off by a constant",
         equation="theta += c",
         source="mounting of the marker; Censi et al. 2013, IEEE TRO 29",
@@ -136,7 +137,7 @@ RECORDS = (
         search=Search((signed("offset", 0.6),)),
     ),
     EffectRecord(
-        name="camera_scale", site="camera", stage="optics",
+        name="camera_scale", site="camera", stage="optics", step=statements.SCALE,
         words="the camera scales x and y differently",
         equation="x (1 + d / 2), y (1 - d / 2)",
         source="non-square pixels; Hartley, Zisserman 2004, ch. 6",
@@ -146,7 +147,7 @@ RECORDS = (
         search=Search((signed("difference", 0.4),)),
     ),
     EffectRecord(
-        name="lens_distortion", site="camera", stage="optics",
+        name="lens_distortion", site="camera", stage="optics", step=statements.LENS,
         words="the camera's lens bends the picture",
         equation="p -> c + (p - c) (1 + k |p - c|^2)",
         source="Brown 1966, Decentering distortion of lenses, Photogrammetric Engineering 32",
@@ -194,7 +195,7 @@ RECORDS = (
         chance=Chance("repeat", (2,), frozen_squares),
     ),
     EffectRecord(
-        name="camera_tilt", site="camera", stage="optics",
+        name="camera_tilt", site="camera", stage="optics", step=statements.TILT,
         words="the camera looks at the floor aslant",
         equation="p -> p / (1 + a x + b y)",
         source="Hartley, Zisserman 2004, Multiple View Geometry, ch. 2 (homography)",

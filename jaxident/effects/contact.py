@@ -4,6 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxident.array_types import Array
+from jaxident.effects import statements
 from jaxident.effects.effect import (
     ALONG,
     BOTH,
@@ -132,7 +133,7 @@ def _from_slope(parameters) -> dict[str, float]:
 
 RECORDS = (
     EffectRecord(
-        name="traction_limit", site="contact", stage="grip",
+        name="traction_limit", site="contact", stage="grip", step=statements.GRIP, quantity="push limit",
         words="the wheels push no harder than their grip on the floor, or the motors' current, allows",
         equation="per wheel c = m - n -> L tanh(c / L); dry: c, beyond +-L +-L until e = 0, tau e' = c -+ L - e",
         source="Pacejka 2012, Tire and Vehicle Dynamics, ch. 4 (smooth saturation of the tyre force); dry: Coulomb "
@@ -149,7 +150,7 @@ RECORDS = (
                       lambda _: [{}, {"inverse_square": 2.0, "dry": 1.0, "spin": 0.02}]),
     ),
     EffectRecord(
-        name="lateral_slip", site="contact", stage="side",
+        name="lateral_slip", site="contact", stage="side", step=statements.LATERAL, quantity="side slip",
         words="the robot drifts outwards in curves",
         equation="sideways speed -c v w",
         source="Wong 2008, Theory of Ground Vehicles, ch. 5 (cornering stiffness)",
@@ -158,7 +159,7 @@ RECORDS = (
         search=Search((signed("slip", 0.5),), on_speeds=True),
     ),
     EffectRecord(
-        name="slope", site="contact", stage="body",
+        name="slope", site="contact", stage="body", step=statements.SLOPE, quantity="tilted floor",
         words="the floor is not level",
         equation="v' += g cos(theta - theta_0)",
         source="gravity on a tilted floor: 0.1 m/s^2 is 0.6 degrees",

@@ -6,6 +6,7 @@ A wheel's speed n is expressed as the command that would hold it (see `friction`
 import jax.numpy as jnp
 
 from jaxident.array_types import Array, Wheels
+from jaxident.effects import statements
 from jaxident.effects.effect import ALONG, BOTH, UNIT, Coordinate, EffectRecord, Parameter, Search, positive, signed
 from jaxident.effects.signals import Motion
 from jaxident.robot.drive import Force
@@ -48,7 +49,7 @@ def _levels(typical: float) -> tuple[Parameter, Parameter]:
 
 RECORDS = (
     EffectRecord(
-        name="coulomb_friction", site="drive", stage="friction",
+        name="coulomb_friction", site="drive", stage="friction", step=statements.COULOMB, quantity="dry friction",
         words="dry friction, the same at any speed",
         equation="m -> m - F sign n, n the wheel's speed; at rest |F| up to its level",
         source="Olsson et al. 1998, Friction models and friction compensation, Eur. J. Control 4",
@@ -57,7 +58,7 @@ RECORDS = (
         search=Search((positive("right", 0.5), positive("left", 0.5)), on_speeds=True),
     ),
     EffectRecord(
-        name="stiction", site="drive", stage="friction",
+        name="stiction", site="drive", stage="friction", step=statements.STRIBECK,
         words="it takes more to leave rest than to keep moving",
         equation="m -> m - F exp(-(n / n_s)^2) sign n; at rest |F| up to its level",
         source="Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30 (Stribeck's curve)",
@@ -71,7 +72,7 @@ RECORDS = (
                                        for s, fade in ((0.05, 0.05), (0.15, 0.05), (0.1, 0.15))]),
     ),
     EffectRecord(
-        name="quadratic_drag", site="drive", stage="body",
+        name="quadratic_drag", site="drive", stage="body", step=statements.DRAG,
         words="drag that grows with the square of the speed",
         equation="v' -= c v |v|, w' -= d w |w|",
         source="Fossen 2011, Handbook of Marine Craft, ch. 6; fans and brushes on land",
@@ -82,7 +83,7 @@ RECORDS = (
         search=Search((Coordinate("along", 0.0, 0.0, 100.0, 3.0), positive("heading", 5.0)), on_speeds=True),
     ),
     EffectRecord(
-        name="mass_offset", site="drive", stage="body",
+        name="mass_offset", site="drive", stage="body", step=statements.MASS_OFFSET,
         words="the centre of mass lies off the axle",
         equation="v' += c w^2, w' -= d v w",
         source="Fierro, Lewis 1998, Control of a nonholonomic mobile robot, IEEE TNN 9",
@@ -93,7 +94,7 @@ RECORDS = (
         search=Search((signed("along", 0.4), signed("heading", 40.0)), on_speeds=True),
     ),
     EffectRecord(
-        name="turn_loss", site="drive", stage="body",
+        name="turn_loss", site="drive", stage="body", step=statements.TURN_LOSS,
         words="speed is lost while turning",
         equation="v' -= c |w| v",
         source="castor scrub; Wong 2008, Theory of Ground Vehicles, ch. 6",

@@ -28,7 +28,8 @@ How to add an effect
 2. Write the function in the file of its site, and below it one `EffectRecord` in `RECORDS`. That is all: the catalogue,
    both integrators, the command line, model files, reports and the search read the record. No other line of the
    package names an effect.
-3. Give it twins, written from the equation and not from the code: in `tests/support/reference_effects.py`, and in the
+3. Write the law once more as plain statements (`statements.Step`), for exports.
+4. Give it twins, written from the equation and not from the code: in `tests/support/reference_effects.py`, and in the
    robots with hidden effects (`experiments/withheld`: `batch_robot.NEUTRAL`, `robots.LAWS`). The tests that run over
    the whole catalogue then compare both integrators with them.
 
@@ -43,6 +44,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from jaxident.array_types import Array
+from jaxident.effects.statements import Step
 
 UNIT = "unit"
 """The unit of the motor command, which is the user's."""
@@ -184,6 +186,8 @@ class EffectRecord(NamedTuple):
     smooth: whether the simulation has a derivative by the parameters at neutral; where not, `grid` holds values of the
     first parameter to try instead. sharp: it has corners within a sample. varies: it changes while the command is held.
     timed: it goes by session time. extension: beyond the catalogue that this program was asked for.
+    step: its law as statements for programs without this package; None where it draws. quantity: what simulators and
+    controllers call it, where one of them has a word for it (`jaxident.export`).
     Every record has `search` or `chance`.
     """
 
@@ -207,6 +211,8 @@ class EffectRecord(NamedTuple):
     varies: bool = False
     timed: bool = False
     extension: bool = False
+    step: Step | None = None
+    quantity: str = ""
 
     @property
     def random(self) -> bool:

@@ -5,6 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxident.array_types import Array, Wheels
+from jaxident.effects import statements
 from jaxident.effects.effect import BOTH, UNIT, Coordinate, EffectRecord, Parameter, Search, Transform, signed
 from jaxident.effects.signals import Load, Zone
 
@@ -37,7 +38,7 @@ def payload_lightness(time: Array, step: Array, loss: Array, instant: Array) -> 
 
 RECORDS = (
     EffectRecord(
-        name="gain_drift", site="time", stage="motor",
+        name="gain_drift", site="time", stage="motor", step=statements.GAIN_DRIFT,
         words="the drive grows weaker or stronger with time, as when a battery runs down",
         equation="m -> (1 + k t) m, t the session time",
         source="discharge of batteries; Plett 2015, Battery Management Systems, ch. 2",
@@ -47,7 +48,7 @@ RECORDS = (
         search=Search((signed("rate", 0.05),)),
     ),
     EffectRecord(
-        name="dead_zone_drift", site="time", stage="zone",
+        name="dead_zone_drift", site="time", stage="zone", step=statements.ZONE_DRIFT,
         words="the dead zones change with time, as by wear",
         equation="D -> D + k t, t the session time",
         source="run-in and wear of gears; Olsson et al. 1998, Eur. J. Control 4",
@@ -57,7 +58,7 @@ RECORDS = (
         search=Search((signed("rate", 0.05),)),
     ),
     EffectRecord(
-        name="payload_change", site="time", stage="load",
+        name="payload_change", site="time", stage="load", step=statements.PAYLOAD,
         words="the load changed at some instant",
         equation="[v, w]' -> [v, w]' / r from the session time t_c on",
         source="Newton's second law; Basseville, Nikiforov 1993, Detection of Abrupt Changes",
