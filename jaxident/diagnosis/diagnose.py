@@ -1,5 +1,6 @@
 """One diagnosis from start to end: logs in; gap, place, causes, shrink and corrected model out."""
 
+import dataclasses
 from collections.abc import Sequence
 from math import isfinite
 from typing import NamedTuple
@@ -98,6 +99,8 @@ def diagnose(
     common, surplus = shared(shown, simulator)
     direct = direct_effects(prepared, finding, shown)
     given = None if simulator is None else as_model(prepared, simulator.vector, finding.law, simulator.effects, direct)
+    if given is not None and model is not None:
+        given = dataclasses.replace(given, discovered=model.discovered)
     gap, account, where, shrinks, corrected, laws = measure(prepared, finding, given, common, direct, seed)
     judgement = judge(finding, gap, extra, simulator)
     selected = tuple(name for name in shown if name not in common) if judgement.none < 0.5 else ()

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.checks import check_effects
+from jaxident.effects.discovered import check_discovered
 from jaxident.errors import InputError
 from jaxident.export import c_header, gap, gazebo, isaac, mjcf, python, robot_localization, ros2_control, table
 from jaxident.export.ask import Ask, assumed, check, largest_command, reach, unused
@@ -79,6 +80,7 @@ def export(
         diagnosis = gap.beside(model) if diagnosis is None else diagnosis
         model = load_model(model)
     check_effects(model.effects)
+    check_discovered(model.discovered)
     made = _made(model, TARGETS[to], ask, diagnosis, path)
     if path is not None:
         _write(made, path)

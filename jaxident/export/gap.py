@@ -14,7 +14,7 @@ import numpy as np
 
 from jaxident.effects.simulate import is_random, simulate
 from jaxident.errors import InputError
-from jaxident.export.split import COUPLING, DEAD_ZONE, LOST, RATE, SLIP, Part
+from jaxident.export.split import COUPLING, DEAD_ZONE, DISCOVERED, LOST, RATE, SLIP, Part
 from jaxident.files.json_text import read_json
 from jaxident.log import Log, make_log
 from jaxident.robot.drive import Physical
@@ -57,7 +57,7 @@ def read_account(path: str | os.PathLike) -> dict[str, float]:
 
 def _measured(model: Model, part: Part, account: dict[str, float], runner, largest: float) -> Part:
     name = "slip" if part.name == SLIP else part.name
-    if name in account and (part.effect or part.name == SLIP):
+    if name in account and (part.effect or part.name in (SLIP, DISCOVERED)):
         return part._replace(gap=account[name], source="diagnosis.json")
     less = _without(model, part)
     if less is None:
@@ -73,6 +73,8 @@ def _without(model: Model, part: Part) -> Model | None:
     drive = model.physical
     if part.effect:
         return dataclasses.replace(model, effects=tuple(one for one in model.effects if one.name != part.name))
+    if part.name == DISCOVERED:
+        return dataclasses.replace(model, discovered=())
     if part.name == DEAD_ZONE:
         return dataclasses.replace(model, dead_zone=np.zeros(2))
     if part.name == COUPLING and drive is not None:

@@ -16,7 +16,7 @@ from jaxident.robot.model import Effect, Model
 FIELD, WRAPPER, LOST = "field", "wrapper", "not carried"
 
 GAIN, RATE, COUPLING, DEAD_ZONE = "gain", "rate", "coupling", "dead zone"
-CAMERA, SLIP = "camera noise", "random slip"
+CAMERA, SLIP, DISCOVERED = "camera noise", "random slip", "discovered"
 
 ANY = "*"
 """Quantity of a target's field that takes every effect."""
@@ -74,7 +74,8 @@ def split(model: Model, target: Target, coupled: bool = True) -> list[Part]:
     if not coupled and COUPLING in target.fields:
         lost = Part(COUPLING, LOST, "no masses give it")
         nominal = [lost if part.name == COUPLING else part for part in nominal]
-    return nominal + [_effect(effect, model, target) for effect in model.effects if acts(effect)]
+    laws = [_discovered(target)] if model.discovered else []
+    return nominal + [_effect(effect, model, target) for effect in model.effects if acts(effect)] + laws
 
 
 def _quantities(model: Model) -> list[str]:
@@ -119,6 +120,13 @@ def _effect(effect: Effect, model: Model, target: Target) -> Part:
             return Part(effect.name, FIELD if target.inside else WRAPPER, where, effect=True)
         return Part(effect.name, LOST, f"its law is carried only without {', '.join(record.step.neutral)}", effect=True)
     return Part(effect.name, LOST, f"{target.title} has no word for it, and no command can do it", effect=True)
+
+
+def _discovered(target: Target) -> Part:
+    """The discovered laws together."""
+    if ANY in target.fields:
+        return Part(DISCOVERED, FIELD, target.fields[ANY])
+    return Part(DISCOVERED, LOST, f"{target.title} has no word for the curve of a signal")
 
 
 def _alone(effect: Effect, model: Model, target: Target) -> bool:

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 
 from jaxident.effects.catalogue import CATALOGUE
+from jaxident.effects.discovered import ACTS, SIGNALS
 from jaxident.effects.effect import UNIT
 from jaxident.export.split import ANY, CAMERA, COUPLING, DEAD_ZONE, EVERY, GAIN, RATE, SLIP, Target
 from jaxident.export.text import number, origin
-from jaxident.robot.model import Model
+from jaxident.robot.model import Discovered, Model
 
 TARGET = Target(
     "table", "the table", dict.fromkeys((GAIN, RATE, COUPLING, DEAD_ZONE, CAMERA, SLIP, ANY), "a row for each number"),
@@ -54,7 +55,8 @@ def rows_of(model: Model) -> list[Row]:
     if model.noise is not None:
         parts.append(("noise", model.noise._asdict(), _deviations(getattr(spread, "noise", None), None)))
     found = [row for name, values, deviations in parts for row in _rows(name, values, deviations, model)]
-    return found + [row for effect in model.effects for row in _effect_rows(effect, model)]
+    found += [row for effect in model.effects for row in _effect_rows(effect, model)]
+    return found + [row for law in model.discovered for row in _law_rows(law, model)]
 
 
 def _deviations(within: Any, spread: Any) -> dict[str, Any] | None:
@@ -96,6 +98,18 @@ def _effect_rows(effect: Any, model: Model) -> list[Row]:
         )
         for name, value in effect.parameters.items()
     ]
+
+
+def _law_rows(law: Discovered, model: Model) -> list[Row]:
+    """One row for each knot of a discovered law."""
+    factor = "" if law.times == "1" else f"{law.times} times a curve of "
+    unit = ACTS[law.acts_on] + {"1": "", "v": " per m/s", "w": " per rad/s"}[law.times]
+    spread = np.full(np.shape(law.at), np.nan) if law.standard_deviation is None else law.standard_deviation
+    return [
+        _row(f"discovered: {law.acts_on}", f"{factor}{law.signal} at {float(at):.4g} {SIGNALS[law.signal]}", value,
+             unit, _or_nan(own), law.standard_deviation is not None, model)
+        for at, value, own in zip(law.at, law.value, spread, strict=True)
+    ]  # fmt: skip
 
 
 def _or_nan(value: Any) -> float:

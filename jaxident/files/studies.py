@@ -163,9 +163,12 @@ def _model(value: Any, where: str, folder: str) -> tuple[Model, str]:
     name = take_text(value, where)
     beside = os.path.join(folder, name)
     try:
-        return load_model(beside if os.path.exists(beside) else name), name
+        found = load_model(beside if os.path.exists(beside) else name)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
+    if found.discovered:
+        raise InputError(f"{where}: {name}: discovered: a study does not run discovered laws; take them out")
+    return found, name
 
 
 def _label(title: str, point: dict[str, float]) -> str:

@@ -133,3 +133,10 @@ def test_too_many_laws_are_refused():
 
 def test_every_place_has_a_law_that_was_tried():
     assert {law[0] for law in LAWS} == set(ACTS)
+
+
+def test_what_does_not_run_laws_says_so():
+    from jaxident.diagnosis.planning.next_run import plan
+
+    with pytest.raises(InputError, match="a plan does not run discovered laws"):
+        plan(with_law(*LAWS[0]), ("transport_delay", "motor_lag"))

@@ -18,7 +18,7 @@ from jaxident.effects.apply import with_effects
 from jaxident.errors import InputError
 from jaxident.export.export import TARGETS
 from jaxident.robot.drive import Physical
-from jaxident.robot.model import Effect, Model, Provenance, Spread
+from jaxident.robot.model import Discovered, Effect, Model, Provenance, Spread
 from jaxident.robot.noise import Noise
 
 DRIVE = Physical(np.array([4.0, 6.0]), np.array([[1.2, 1.1], [9.0, -8.5]]), np.array([0.02, -1.0]))
@@ -266,3 +266,18 @@ def test_options_that_a_target_does_not_need_are_told():
     assert any("--track is not used" in line for line in ji.export(PLAIN, "mjcf", track=0.3).assumed)
     assert any("--mass is not used" in line for line in ji.export(PLAIN, "python", mass=2.0).assumed)
     assert not any("not used" in line for line in ji.export(PLAIN, "gazebo", track=0.3, mass=2.0).assumed)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_a_discovered_law_is_told_with_what_it_is_worth(target):
+    """No target has a word for it but the table, which has its knots."""
+    at = np.linspace(-3.0, 3.0, 7)
+    law = Discovered("acceleration along", "v", "w", at, -0.3 * at**2)
+    made = ji.export(dataclasses.replace(PLAIN, discovered=(law,)), target)
+    (part,) = (part for part in made.parts if part.name == "discovered")
+    if target == "table":
+        assert part.how == "field"
+        assert made.text.count("discovered: acceleration along") == len(at)
+    else:
+        assert part.how == "not carried"
+        assert part.gap > 1.0

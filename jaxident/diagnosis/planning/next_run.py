@@ -21,6 +21,7 @@ from jaxident.diagnosis.noise.law import whitener_of
 from jaxident.diagnosis.planning.question import Question, ask, check_names, expected_size, noise_of
 from jaxident.diagnosis.planning.trial_inputs import ORDINARY, draw, make, vary
 from jaxident.effects.coordinates import NOMINAL
+from jaxident.errors import InputError
 from jaxident.log import Log, make_log
 from jaxident.numerics import require_float64
 from jaxident.robot.model import Model
@@ -59,6 +60,8 @@ def plan(
     """
     require_float64("plan")
     check_names(effects)
+    if model.discovered:
+        raise InputError("discovered: a plan does not run discovered laws; take them out of the model")
     noise, assumed = noise_of(model)
     sizes = {name: expected_size(model, name, limit, samples) for name in effects}
     question = ask(model, effects, sizes, noise, samples, limit)
