@@ -28,7 +28,7 @@ def sentence(shown: Shown) -> str:
     """One law in a sentence."""
     law = shown.law
     what = f"{TIMES_WORDS[law.times]}a curve of the {SIGNAL_WORDS[law.signal]}"
-    return f"the {law.acts_on} has {what} in it{_like(shown)}"
+    return f"to the {law.acts_on} comes {what}{_like(shown)}"
 
 
 def _like(shown: Shown) -> str:
@@ -37,7 +37,7 @@ def _like(shown: Shown) -> str:
     if form is None:
         return ""
     values = ", ".join(f"{key} = {number(value)}" for key, value in form.parameters.items())
-    return f"; {percent(form.part_explained)} of it looks like {form.form}, s the signal, {values}"
+    return f" ({percent(form.part_explained)} of it is {form.form} with s = {shown.law.signal}, {values})"
 
 
 def discovered(found: Diagnosis) -> list[Section]:

@@ -23,7 +23,8 @@ from jaxident.robot.model import Discovered, Model
 
 class Shown(NamedTuple):
     """A discovered law in the user's unit, the rows that lie nearest to each of its knots, the share of the refitted
-    nominal model's error that it takes away, the probability that it takes none away, and what it looks like."""
+    nominal model's error that it takes away beside the laws before it, the probability that it takes none away, and
+    what it looks like."""
 
     kind: Kind
     law: Discovered
@@ -34,13 +35,15 @@ class Shown(NamedTuple):
 
 
 class Confirmed(NamedTuple):
-    """Curves that the judging rows confirm. whole: the corrected model with them, and judged there; named: the model
-    with the named effects alone, under the same noise law, of which there are draws."""
+    """Curves that the judging rows confirm, each with the fit in which it came last. whole: the corrected model with
+    all of them, and judged there; named: the model with the named effects alone, under the same noise law, of which
+    there are draws; before: how that one does."""
 
-    bending: Bending
+    steps: list[Bending]
     whole: Corrected
     judged: Judged
     named: Corrected
+    before: Judged
     draws: Draws
 
     @property
@@ -52,24 +55,33 @@ class Confirmed(NamedTuple):
 def confirm(prepared: Prepared, finding: Finding, direct: dict, seed: int) -> Confirmed | None:
     """The most curves, in the order in which they were found, that take error away on the judging rows, 95 % surely;
     None if none do. The judging rows only accept or refuse: they change no number of a curve."""
-    for bending in reversed(discover(finding)):
-        whole, draws = sized_corrected(prepared, beside(finding, bending), direct, seed, bending)
+    steps = discover(finding)
+    while steps:
+        whole, draws = sized_corrected(prepared, beside(finding, steps[-1]), direct, seed, steps[-1])
         named = corrected_of(prepared, finding, whole.law, direct)
         judged, before = judge_model(whole.model, prepared), judge_model(_plain(named.model), prepared)
         unit = deviations(whole.law) ** 2
         share, p_value = _taken(before, judged, before.error**2 / unit, unit, seed)
         if share > 0.0 and p_value < LOW:
-            return Confirmed(bending, whole, judged, named, draws)
+            return Confirmed(steps, whole, judged, named, before, draws)
+        steps = steps[:-1]
     return None
 
 
-def each_law(prepared: Prepared, found: Confirmed, total: Array, unit: Array, seed: int) -> tuple[Shown, ...]:
-    """Every law with what switching it off would bring back, all else alike; total (starts, 3): squares of the refitted
-    nominal model over the camera's variances `unit` (3,)."""
-    shown = []
-    for k, curve in enumerate(found.bending.curves):
-        without = with_curves(found.whole, found.bending, prepared.largest, but=k)
-        share, p_value = _taken(judge_model(_plain(without.model), prepared), found.judged, total, unit, seed)
+def each_law(
+    prepared: Prepared, finding: Finding, found: Confirmed, total: Array, unit: Array, seed: int
+) -> tuple[Shown, ...]:
+    """Every law with what it takes away beside those that were found before it, all else refitted; total (starts, 3):
+    squares of the refitted nominal model over the camera's variances `unit` (3,)."""
+    shown, last = [], found.before
+    for k, step in enumerate(found.steps, 1):
+        if k == len(found.steps):
+            now = found.judged
+        else:
+            part = corrected_of(prepared, beside(finding, step), found.whole.law, found.whole.direct)
+            now = judge_model(_plain(with_curves(part, step, prepared.largest).model), prepared)
+        share, p_value = _taken(last, now, total, unit, seed)
+        curve, last = found.steps[-1].curves[k - 1], now
         law = as_law(curve, prepared.largest)
         density = tuple(int(n) for n in curve.density)
         shown.append(Shown(curve.kind, law, density, share, p_value, form_of(curve, law)))

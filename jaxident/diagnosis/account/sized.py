@@ -32,11 +32,11 @@ def sized_corrected(
     return with_curves(corrected_of(prepared, finding, law, direct), bending, prepared.largest), draws.less_slip(factor)
 
 
-def with_curves(corrected: Corrected, bending: Bending | None, largest: float, but: int = -1) -> Corrected:
-    """The corrected model with curves, without one of them if told."""
+def with_curves(corrected: Corrected, bending: Bending | None, largest: float) -> Corrected:
+    """The corrected model with curves."""
     if bending is None:
         return corrected
-    kept = tuple(as_law(curve, largest) for k, curve in enumerate(bending.curves) if k != but)
+    kept = tuple(as_law(curve, largest) for curve in bending.curves)
     return corrected._replace(model=dataclasses.replace(corrected.model, discovered=kept))
 
 

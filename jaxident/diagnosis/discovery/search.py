@@ -10,10 +10,9 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.alike import with_prior
-from jaxident.diagnosis.causes.corrector import WORTH
 from jaxident.diagnosis.causes.finding import Finding
 from jaxident.diagnosis.causes.refit import Data, Solution
-from jaxident.diagnosis.causes.rounds import LIKELY
+from jaxident.diagnosis.causes.rounds import LIKELY, SURE
 from jaxident.diagnosis.discovery.candidates import KINDS, KNOTS, candidates, path_of
 from jaxident.diagnosis.discovery.curves import Bent, bend
 from jaxident.diagnosis.discovery.fit import (
@@ -82,10 +81,10 @@ def _stands(windows: Windows, fit: Solution, curves: tuple[Curve, ...], law: Law
 
 
 def strongest(data: Data, fit: Solution, curves: tuple[Curve, ...]) -> Curve | None:
-    """The curve that brings most beside some others, about a fit that has these; None if none is worth WORTH."""
+    """The curve that brings most beside some others, about a fit that has these; None if none is worth SURE."""
     responses = respond(np.exp(fit.vector[:2]), fit.linear.residual, data.windows)
     base, prior = _base(data, fit, curves)
-    best, most = None, WORTH
+    best, most = None, SURE
     for each in candidates(path_of(fit, data.windows, laws_from(curves)), responses):
         if any(each.kind == curve.kind for curve in curves):
             continue
