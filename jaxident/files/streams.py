@@ -7,10 +7,10 @@ import numpy as np
 
 from jaxident.array_types import Pose, Wheels
 from jaxident.errors import InputError
-from jaxident.files.rules import Rule, enforce, ordered_time, pose_rules
 from jaxident.files.source import Source
 from jaxident.files.table import Table, read_table
 from jaxident.log import Log, make_log
+from jaxident.rules import Rule, enforce, ordered_time, pose_rules
 
 ROUNDING = 1e-3
 """Rounding of time stamps, in periods: a command that comes this much after a row is still the row's own."""
