@@ -19,7 +19,8 @@ from jaxident.diagnosis.translate import to_model
 from jaxident.diagnosis.verdict import Judgement, judge
 from jaxident.effects.coordinates import ASIDE, PLACES
 from jaxident.errors import InputError
-from jaxident.log import Log
+from jaxident.estimation.suspicions import log_suspicions
+from jaxident.log import Log, join
 from jaxident.numerics import require_float64
 from jaxident.robot.model import Model
 
@@ -42,7 +43,8 @@ class Diagnosis(NamedTuple):
     """What `diagnose` found. verdict: "no_gap", "parameters", "effects", "partly", "unknown" or "undecided". selected:
     the named effects, in the order in which they were accepted. visible: the gain that each effect of typical size
     would have had; below CLAIMED this input could not have shown it. replay: what faint effects come out as. surplus:
-    effects that the user's simulator has and the robot has not."""
+    effects that the user's simulator has and the robot has not. suspicions: what the log says against itself, with the
+    option that mends it, a line each."""
 
     verdict: str
     judgement: Judgement
@@ -61,6 +63,7 @@ class Diagnosis(NamedTuple):
     finding: Finding
     surplus: tuple[str, ...] = ()
     simulator: Simulator | None = None
+    suspicions: tuple[str, ...] = ()
 
     @property
     def not_testable(self) -> list[str]:
@@ -104,7 +107,7 @@ def diagnose(
     nominal = to_model(prepared, finding.nominal.vector, finding.law, (), None, finding.nominal)
     return Diagnosis(verdict, judgement, gap, account, where, selected, parameters, visible(known),
                      replay(known, seed), advice(verdict, judgement), nominal, corrected, shrinks, prepared, finding,
-                     surplus, simulator)  # fmt: skip
+                     surplus, simulator, log_suspicions(join(logs)))  # fmt: skip
 
 
 def check_nominal(logs: Log | Sequence[Log], sim: Log | Sequence[Log] | None, model: Model | None) -> None:

@@ -36,10 +36,12 @@ def read_log(
     a repeat of the command before (0 in a run of a single row). Further columns are ignored with a UserWarning.
     InputError in one line names the file, the line and what would be right.
     """
-    chosen = make_columns(columns, units)
-    if os.path.isdir(path):
-        return join([read_file(file, chosen) for file in find_logs(path)])
-    return read_file(path, chosen)
+    return read_whole(path, make_columns(columns, units))
+
+
+def read_whole(path: Source, columns: Columns | None = None) -> Log:
+    """A file or a folder as one log; see `read_log`."""
+    return join(read_logs(path, columns)) if os.path.isdir(path) else read_file(path, columns)
 
 
 def read_file(path: Source, columns: Columns | None = None) -> Log:
