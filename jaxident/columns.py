@@ -111,6 +111,15 @@ def rename(header: Iterable[str], columns: Columns, place: str) -> list[str]:
     return [new.get(name, f"{name} (replaced)" if name in columns else name) for name in header]
 
 
+def split_heading(header: Iterable[str], columns: Columns) -> tuple[Columns, Column | None]:
+    """The columns without a change of `theta` where the table has none of that name, and that change: it is for the
+    heading that a quaternion gives."""
+    change = columns.get("theta")
+    if change is None or change.source != "theta" or "theta" in header:
+        return columns, None
+    return {name: column for name, column in columns.items() if name != "theta"}, change
+
+
 def heading_of(qx: Any, qy: Any, qz: Any, qw: Any) -> np.ndarray:
     """Heading [rad] of a quaternion of any length: rotation about z, yaw of yaw-pitch-roll; NaN for (0, 0, 0, 0)."""
     x, y, z, w = (np.asarray(part, float) for part in (qx, qy, qz, qw))

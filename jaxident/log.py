@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Pose, Wheels
-from jaxident.columns import QUATERNION, heading_of, make_columns, numbers, rename
+from jaxident.columns import QUATERNION, heading_of, make_columns, numbers, rename, split_heading
 from jaxident.errors import InputError
 from jaxident.rules import Rule, enforce, pose_rules, rising_time
 
@@ -110,14 +110,15 @@ def from_columns(columns: Mapping[str, Any], name: str = "log") -> Log:
 
 def from_frame(frame: Any, columns: Any = None, units: Any = None) -> Log:
     """What `Log.from_dataframe` says."""
-    chosen = make_columns(columns, units)
     named = {str(column): column for column in frame.keys()}  # noqa: SIM118 - a frame's, too
+    chosen, change = split_heading(named, make_columns(columns, units))
     header = rename(named, chosen, "frame")
     found = {name: frame[named[source]] for name, source in zip(header, named, strict=True)}
     values = {name: numbers(name, found[name]) for name in (*Log._fields, *QUATERNION) if name in found}
     values |= {name: column.convert(values[name]) for name, column in chosen.items() if name in values}
     if "theta" not in values and all(name in values for name in QUATERNION):
         values["theta"] = heading_of(*(values[name] for name in QUATERNION))
+        values["theta"] = change.convert(values["theta"]) if change else values["theta"]
     missing = [name for name in ("t", "u_r", "u_l") if name not in values]
     if missing:
         raise InputError(

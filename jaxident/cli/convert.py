@@ -65,6 +65,8 @@ def command(commands, poses, bag, listing, out, period, track, pose_offset, hold
     """
     if bool(bag) == bool(commands or poses) or (not bag and not (commands and poses)):
         raise click.UsageError(NEEDED)
+    if listing and not bag:
+        raise click.UsageError("--list shows the topics of --bag PATH")
     if listing:
         _list(bag)
         return
@@ -77,16 +79,34 @@ def command(commands, poses, bag, listing, out, period, track, pose_offset, hold
     from jaxident.files.streams import merge
 
     with working("converting"):
-        given, seen = _from_bag(bag, chosen) if bag else _from_files(commands, poses, chosen)
-        offset = _estimate(given, seen, track) if pose_offset == "auto" else pose_offset
+        given, seen, notes = _from_bag(bag, chosen) if bag else _from_files(commands, poses, chosen)
+        offset, told = _estimate(given, seen, track) if pose_offset == "auto" else (pose_offset, ())
         settings = {"period": period, "track": track, "pose_offset": offset, "hold_timeout": hold_timeout}
         log = merge(given, seen, **settings)
         doubts = log_suspicions(log)
         write_log(log, out)
-    warn(doubts, chosen["columns"] | chosen["command_columns"] | chosen["pose_columns"])
+    for note in (*notes, *told):
+        click.echo(note)
+    own = chosen["columns"] | chosen["command_columns"] | chosen["pose_columns"]
+    warn(_for_speeds(doubts) if track else doubts, own)
     measured = np.count_nonzero(np.isfinite(log.x))
     click.echo(f"{len(log.t)} rows, {measured} with a pose, {log.t[-1] - log.t[0]:.6g} s")
     wrote(out)
+
+
+IN_SPEEDS = {
+    "--columns u_r=u_l,u_l=u_r": "--columns w=w:-1",
+    "--columns u_r=u_r:-1,u_l=u_l:-1": "--columns v=v:-1,w=w:-1",
+    "--columns u_r=u_l:-1,u_l=u_r:-1": "--columns v=v:-1",
+}
+"""What mends commands of wheels, in terms of the speeds that they were made from."""
+
+
+def _for_speeds(lines):
+    """The lines, their options those of commands in v,w; a single wheel that is reversed has none."""
+    for wheels, speeds in IN_SPEEDS.items():
+        lines = [line.replace(f"`{wheels}`", f"`{speeds}`") for line in lines]
+    return lines
 
 
 def _from_files(commands, poses, chosen):
@@ -94,7 +114,7 @@ def _from_files(commands, poses, chosen):
 
     columns = chosen["columns"]
     given = read_commands(commands, columns | chosen["command_columns"])
-    return given, read_poses(poses, columns | chosen["pose_columns"])
+    return given, read_poses(poses, columns | chosen["pose_columns"]), ()
 
 
 def _from_bag(bag, chosen):
@@ -103,23 +123,23 @@ def _from_bag(bag, chosen):
 
     choice = Choice(chosen["child_frame"], chosen["wheel_order"], chosen["bag_time"])
     columns = chosen["columns"] | chosen["command_columns"] | chosen["pose_columns"]
-    given, seen, notes = read_bag_streams(bag, chosen["command_topic"], chosen["pose_topic"], choice, columns)
-    for note in notes:
-        click.echo(note)
-    return given, seen
+    return read_bag_streams(bag, chosen["command_topic"], chosen["pose_topic"], choice, columns)
 
 
-def _estimate(given, seen, track) -> float:
+def _estimate(given, seen, track):
+    """The offset, and a line that tells it."""
     from jaxident.files.offset import estimate_offset
 
     found = estimate_offset(given, seen, track)
     error = f"standard error {found.standard_error:.1g} s"
-    click.echo(f"--pose-offset {found.offset:.6f} ({error}; a delay of the robot counts in it)")
-    return found.offset
+    return found.offset, (f"--pose-offset {found.offset:.6f} ({error}; a delay of the robot counts in it)",)
 
 
 def _list(bag) -> None:
     from jaxident.files.bags import list_topics
 
-    rows = [(one.name, one.type, str(one.messages), f"{one.rate:.4g}", one.suits) for one in list_topics(bag)]
+    rows = [
+        (one.name, one.type, str(one.messages), f"{one.rate:.4g}" if one.rate > 0 else "", one.suits)
+        for one in list_topics(bag)
+    ]
     click.echo(table([("topic", "type", "messages", "rate [1/s]", "could be"), *rows]))

@@ -71,14 +71,15 @@ def motions(log: Log, lag: int = 1, read: Callable[[np.ndarray], np.ndarray] = n
 
 def log_suspicions(log: Log) -> tuple[str, ...]:
     """All suspicions about a log (NumPy arrays) that need no model; the same for every command."""
-    single = motions(log)
-    if len(single.row) < FEWEST:
+    seen = log[np.isfinite(log.x) & np.isfinite(log.y) & np.isfinite(log.theta)]  # rows of events alone have no pose
+    single = motions(seen) if len(seen.t) else None
+    if single is None or len(single.row) < FEWEST:
         return ()
-    frame = flipped_heading(log, single) or misread_heading(log)
+    frame = flipped_heading(seen, single) or misread_heading(seen)
     response = None if frame else respond(streams_of_log(log), LARGEST_OFFSET)
     if response is None:
         return (frame,) if frame else ()
-    steps = np.concatenate([np.diff(run.t[np.isfinite(run.x)]) for run in log.runs()])
+    steps = np.concatenate([np.diff(run.t) for run in seen.runs()])
     lines = (wheel_signs(response), position_unit(response), offset_clock(response, float(np.median(steps))))
     return tuple(line for line in lines if line)
 

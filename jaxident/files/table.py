@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, TextIO
 
 import numpy as np
 
-from jaxident.columns import QUATERNION, Columns, heading_of, iso_seconds, rename
+from jaxident.columns import QUATERNION, Column, Columns, heading_of, iso_seconds, rename, split_heading
 from jaxident.errors import InputError
 from jaxident.files.source import Source, explained
 
@@ -52,9 +52,9 @@ def read_table(path: Source, layouts: Sequence[Layout], optional: Layout = (), c
     there. Semicolons or tabs may part the cells, decimal commas beside them; t may be an ISO date (then Unix time).
     """
     name = "standard input" if os.fspath(path) == "-" else os.fspath(path)
-    columns = columns or {}
     with explained(name, "CSV"), _open_text(path) as stream:
         header, lines_read, separator = _read_header(stream, name, layouts)
+        columns, change = split_heading(header, columns or {})
         header = rename(header, columns, f"{name}, line {lines_read}")
         layouts = [_with_quaternion(layout, header) for layout in layouts]
         wanted = _choose(header, f"{name}, line {lines_read}", layouts, optional)
@@ -68,16 +68,16 @@ def read_table(path: Source, layouts: Sequence[Layout], optional: Layout = (), c
             values.append(_read_block([lines[k] for k in filled], header, wanted, name, number))
             line.append(number)
             lines_read += len(lines)
-    return Table(
-        name, _in_si(dict(zip(wanted, np.concatenate(values).T.copy(), strict=True)), columns), np.concatenate(line)
-    )
+    found = dict(zip(wanted, np.concatenate(values).T.copy(), strict=True))
+    return Table(name, _in_si(found, columns, change), np.concatenate(line))
 
 
-def _in_si(found: dict[str, np.ndarray], columns: Columns) -> dict[str, np.ndarray]:
+def _in_si(found: dict[str, np.ndarray], columns: Columns, change: Column | None) -> dict[str, np.ndarray]:
     """The columns in SI, a quaternion as the heading that it stands for."""
     found = {name: columns[name].convert(values) if name in columns else values for name, values in found.items()}
     if QUATERNION[0] in found:
         found["theta"] = heading_of(*(found.pop(name) for name in QUATERNION))
+        found["theta"] = change.convert(found["theta"]) if change else found["theta"]
     return found
 
 
