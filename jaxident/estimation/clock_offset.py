@@ -206,7 +206,8 @@ def _fit(streams: Streams, offset: float, rate: float) -> Response | None:
             offset += float(np.clip(moved[0], -LONGEST_STEP, LONGEST_STEP))
             rates = np.clip(rates * np.exp(np.clip(moved[1:3], -0.7, 0.7)), SLOWEST_RATE, FASTEST_RATE)
     deviation = np.sqrt(np.maximum(np.diagonal(inverse @ score_covariance(slopes, left) @ inverse), 0.0))
-    explained = 1.0 - np.var(residual, axis=1) / np.maximum(np.var(table.y, axis=1), 1e-300)
+    whole = np.var(table.y, axis=1)
+    explained = np.where(whole > 0.0, 1.0 - np.var(residual, axis=1) / np.where(whole > 0.0, whole, 1.0), 0.0)
     gain_deviation = np.stack([deviation[3:5], deviation[8:10]])
     return Response(offset, float(deviation[0]), gains[:, :2], gain_deviation, rates, scale, explained, len(left) // 2)
 

@@ -22,7 +22,8 @@ def autoregression(residual: np.ndarray) -> np.ndarray:
 
 def inverse_of_products(slopes: np.ndarray) -> np.ndarray:
     """The inverse of their products, 0 where a combination does not show."""
-    size = np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
+    norm = np.linalg.norm(slopes, axis=0)
+    size = np.where(norm > 0.0, norm, 1.0)
     unit = slopes / size
     return np.linalg.pinv(unit.T @ unit, rcond=1e-10, hermitian=True) / np.outer(size, size)
 

@@ -125,3 +125,21 @@ def test_the_lag_is_exact():
 def test_too_little_says_nothing():
     commands, poses = robot(8, length=3.0)
     assert respond(streams_of(commands.t, commands.value, poses.t[:50], Pose(*(c[:50] for c in poses.pose)))) is None
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_degenerate_motion_ends_in_no_error(seed):
+    """Straight lines, rest, one wheel, one switch of a command, a pose that is far off: nothing is claimed."""
+    k, draw = np.arange(600.0), np.random.default_rng(seed)
+    told = np.sin(0.3 * k), np.cos(0.17 * k)
+    off = np.where(k == 300, 1e30, 0.0)
+    t = 0.033 * k + np.where(k > 400, 1e5 * (seed == 1), 0.0)
+    for command, pose in (
+        (told, (1e-3 * k, 0.0 * k, 0.0 * k)),
+        (told, (0.0 * k, 0.0 * k, 0.0 * k)),
+        (told, (off, 0.0 * k, 0.0 * k)),
+        ((0.0 * k, told[1]), draw.normal(size=(3, 600))),
+        ((1.0 * (k > 300), 0.0 * k), np.cumsum(draw.normal(size=(3, 600)), axis=1)),
+    ):
+        found = respond(streams_of(t, Wheels(*command), t, Pose(*pose)))
+        assert found is None or (np.isfinite(found.offset) and not np.all(found.explained > 0.1))

@@ -1,5 +1,6 @@
 """ROS bags of all three formats, made by `rosbags`: what is read, what is said of it, and what is refused."""
 
+import tracemalloc
 import warnings
 
 import numpy as np
@@ -226,3 +227,21 @@ def test_a_file_that_is_no_bag(tmp_path):
     for path in (tmp_path, tmp_path / "x.csv"):
         with pytest.raises(InputError, match="is no bag that can be read"):
             list_topics(path)
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_what_nobody_asked_for_is_not_kept(tmp_path, form):
+    """60 pictures of 1 MB each lie between the messages; reading takes the memory of a few."""
+    path = name_of(tmp_path, form)
+    with Bag(path, form) as bag:
+        add_commands(bag, "Twist")
+        for k, stamp in enumerate(POSE_AT[:60]):
+            picture = np.full(1_000_000, k, np.uint8)
+            header = bag.header(stamp)
+            bag.add("/image", stamp, bag.make("sensor_msgs/Image", header, 1000, 1000, "mono8", 0, 1000, picture))
+        add_poses(bag, "PoseStamped")
+    tracemalloc.start()
+    read_bag_streams(path, "/cmd", "/pose", Choice())
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 15e6
