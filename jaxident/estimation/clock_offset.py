@@ -96,13 +96,15 @@ def respond(streams: Streams, limit: float = np.inf) -> Response | None:
     lags, score = search[best]
     first = float(lags[np.argmax(score)])
     found = _fit(streams, first, START_RATES[best])
-    far = np.abs(lags - first) > max(1.0, 3.0 / START_RATES[best])
+    apart = max(1.0, 3.0 / START_RATES[best])
+    far = np.abs(lags - first) > apart
     if found is None or not far.any():
         return found
-    second = float(lags[far][np.argmax(score[far])])
-    other = _fit(streams, second, START_RATES[best])
-    close = other is not None and found.rows * np.sum(np.log(other.left / found.left)) < DOUBT
-    return found._replace(rival=other.offset if close and other is not None else None)
+    other = _fit(streams, float(lags[far][np.argmax(score[far])]), START_RATES[best])
+    if other is None or abs(other.offset - found.offset) < 0.5 * apart:
+        return found
+    close = found.rows * np.sum(np.log(other.left / found.left)) < DOUBT
+    return found._replace(rival=other.offset if close else None)
 
 
 def _lagged(t: np.ndarray, u: np.ndarray, rate: float) -> np.ndarray:
