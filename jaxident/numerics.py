@@ -33,7 +33,7 @@ _FEW_TRIALS = 16
 def require_float64(caller: str) -> None:
     """Raise RuntimeError with the line to type unless JAX computes in double precision."""
     if not jax.config.jax_enable_x64:  # type: ignore[attr-defined]
-        raise RuntimeError(f'{caller} needs double precision: jax.config.update("jax_enable_x64", True)')
+        raise RuntimeError(f"{caller} needs double precision: call jaxident.start_jax() before your first array")
 
 
 def wrap(angle: Array) -> Array:

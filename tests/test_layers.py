@@ -8,7 +8,7 @@ import sys
 
 PACKAGE = pathlib.Path(__file__).resolve().parents[1] / "jaxident"
 
-GROUND = ("array_types", "errors", "numerics", "log", "start")
+GROUND = ("array_types", "errors", "numerics", "rules", "columns", "log", "start")
 FLOORS = (
     ("ground",),
     ("robot",),
@@ -16,6 +16,7 @@ FLOORS = (
     ("estimation",),
     ("study", "diagnosis"),
     ("files", "plot", "report", "export"),
+    ("entry",),
     ("",),  # the package's own file of public names
     ("cli",),
     ("__main__",),

@@ -47,7 +47,9 @@ def test_join_renumbers_and_keeps_every_row():
     parts = [numbered_log([3, 3, 5], 1), numbered_log([3, 3], 2), numbered_log([5], 3)]
     joined = join(parts)
     np.testing.assert_array_equal(joined.run, [0, 0, 1, 2, 2, 3])
-    np.testing.assert_array_equal(np.stack(joined[:6]), np.concatenate([np.stack(p[:6]) for p in parts], axis=1))
+    np.testing.assert_array_equal(
+        np.stack(tuple(joined)[:6]), np.concatenate([np.stack(tuple(p)[:6]) for p in parts], axis=1)
+    )
     np.testing.assert_array_equal(join(parts[0]).run, [0, 0, 1])
 
 
@@ -110,3 +112,111 @@ def test_two_steps_that_differ_are_refused():
 def test_single_rows_have_no_period():
     with pytest.raises(InputError, match="single row"):
         even_period(numbered_log([0, 1, 2]))
+
+
+def test_slices_pick_rows_and_unpacking_picks_columns():
+    log = numbered_log([0, 0, 1, 1, 1])
+    assert isinstance(log[1:3], Log)
+    np.testing.assert_array_equal(np.stack(log[1:3]), np.stack(log.rows(1, 3)))
+    np.testing.assert_array_equal(log[::-2].t, [4, 2, 0])
+    np.testing.assert_array_equal(log[np.asarray(log.t) > 2].run, [1, 1])
+    np.testing.assert_array_equal(log[[4, 0]].t, [4, 0])
+    t, *_, run = log
+    assert t is log.t is log[0]
+    assert run is log.run is log[-1]
+    assert len(log) == 7
+    assert jax.tree.leaves(log)[0] is log.t
+
+
+def test_rows_between_two_times():
+    log = numbered_log([0] * 5)
+    np.testing.assert_array_equal(log.between(1.0, 3.0).t, [1, 2, 3])
+    np.testing.assert_array_equal(log.between(None, 0.5).t, [0])
+    with pytest.raises(InputError, match="no row between"):
+        log.between(7.0, 9.0)
+
+
+def test_arrays_make_a_checked_log():
+    log = Log.from_arrays([0, 1, 2], [1, 2, 3], np.array([4.0, 5.0, np.nan]))
+    assert all(column.dtype == np.float64 for column in tuple(log)[:6])
+    assert (log.u_l.tolist(), log.run.tolist()) == ([4, 5, 5], [0, 0, 0])
+    for wrong, reason in (
+        (([0, 1, 1], [1] * 3, [1] * 3), "log, row 2, column t: is 1; time must rise"),
+        (([0, 1, 2], [1] * 2, [1] * 3), "log: columns differ in length: t 3, u_r 2"),
+        (([0, 1, 2], [1] * 3, [1] * 3, [0, np.nan, 0], [0] * 3, [0] * 3), "row 1, column x: is empty; a pose has"),
+        ((["0", "1", "now"], [1] * 3, [1] * 3), "row 2, column t: 'now' is not a number"),
+        (([0], [1], [1]), "no run has two rows"),
+        (([], [], []), "has no rows"),
+        ((np.zeros((2, 2)), [1] * 2, [1] * 2), "one row of numbers"),
+    ):
+        with pytest.raises(InputError, match=reason):
+            Log.from_arrays(*wrong)
+
+
+class Frame(dict):
+    """What a data frame has and a log needs: column labels and columns."""
+
+
+RAW = {
+    "time_ms": np.array([0.0, 33.0, 67.0]),
+    "right": np.array([1.0, 2.0, 3.0]),
+    "left": np.array([3.0, 2.0, 1.0]),
+    "X": np.array([0.0, 1.5, np.nan]),
+    "Y": np.array([5.0, 6.0, np.nan]),
+    "yaw": np.array([0.0, 90.0, np.nan]),
+    "note": np.array(["a", "b", "c"]),
+}
+NAMES = {"u_r": "right", "u_l": "left", "x": "X", "y": "Y", "theta": "yaw", "t": "time_ms"}
+
+
+def test_a_frame_with_other_names_and_units():
+    units = {"t": "ms", "x": "mm", "y": 1e-3, "theta": "deg"}
+    log = Log.from_dataframe(Frame(RAW), NAMES, units)
+    assert log.t.tolist() == [0.0, 0.033, 0.067]
+    assert log.x[:2].tolist() == [0.0, 0.0015]
+    np.testing.assert_allclose(log.theta[:2], [0.0, 0.5 * np.pi], rtol=1e-15)
+    text = "t=time_ms:ms, u_r=right, u_l=left, x=X:mm, y=Y:1e-3, theta=yaw:deg"
+    np.testing.assert_array_equal(np.stack(Log.from_dataframe(RAW, text)), np.stack(log))
+
+
+def test_signs_swaps_and_shifts_of_columns():
+    log = Log.from_dataframe(RAW, "t=time_ms:ms,u_r=left,u_l=right:-1,x=Y,y=X:-2+1,theta=yaw:deg-90")
+    assert (log.u_r.tolist(), log.u_l.tolist()) == ([3, 2, 1], [-1, -2, -3])
+    assert log.y[:2].tolist() == [1.0, -2.0]
+    np.testing.assert_allclose(log.theta[:2], [-0.5 * np.pi, 0.0], atol=1e-15)
+    own = {"t": [0, 1], "u_r": [1, 2], "u_l": [3, 4]}
+    assert Log.from_dataframe(own, "u_r=u_l,u_l=u_r").u_r.tolist() == [3, 4]
+
+
+def test_times_as_dates_and_headings_as_quaternions():
+    half = np.sqrt(0.5)
+    frame = {
+        "t": np.array(["2026-01-02T03:04:05.123456789", "2026-01-02T03:04:06"], "datetime64[ns]"),
+        "u_r": [1, 1], "u_l": [1, 1], "x": [0, 0], "y": [0, 0],
+        "qx": [0, 0], "qy": [0, 0], "qz": [half, 2.0], "qw": [half, -2.0],
+    }  # fmt: skip
+    log = Log.from_dataframe(frame)
+    assert log.t.tolist() == [1767323045.1234567, 1767323046.0]
+    np.testing.assert_allclose(log.theta, [0.5 * np.pi, -0.5 * np.pi], rtol=1e-15)
+    texts = ["2026-01-02 03:04:05.123456789", "2026-01-02T05:34:06+02:30"]
+    assert Log.from_dataframe(frame | {"t": texts}).t.tolist() == log.t.tolist()
+
+
+@pytest.mark.parametrize(
+    ("columns", "reason"),
+    [
+        ("t=time", "no column 'time' for t; there are time_ms, right, left"),
+        ("t=time_ms:hours", "t=time_ms: unknown unit 'hours'; it should be s, ms, us, ns, min"),
+        ("u_r=right:m", "unknown unit 'm'; it should be a number to multiply by"),
+        ("t:ms", "'t:ms' is not NAME=COLUMN"),
+        ("speed=right", "no column 'speed' in a log; those are t, u_r"),
+        ("t=time_ms,t=right", "t is given twice"),
+        ("u_r=right,u_l=right", "one column stands for two: u_r=right, u_l=right"),
+        ("x=X:0", "'0' makes every value the same"),
+        ("t=time_ms,u_r=right", "frame: no column u_l; there are"),
+        ("t=note,u_r=right,u_l=left", "row 0, column t: 'a' is not a number"),
+    ],
+)
+def test_a_wrong_column_or_unit_is_named(columns, reason):
+    with pytest.raises(InputError, match=reason):
+        Log.from_dataframe(RAW, columns)

@@ -142,7 +142,7 @@ def test_safe_norm():
 
 def test_double_precision_is_asked_for_by_name():
     require_float64("fit")
-    with jax.enable_x64(False), pytest.raises(RuntimeError, match=r"fit needs .*jax_enable_x64"):
+    with jax.enable_x64(False), pytest.raises(RuntimeError, match=r"fit needs .*start_jax\(\)"):
         require_float64("fit")
 
 

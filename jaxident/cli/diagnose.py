@@ -6,7 +6,7 @@ import os
 import click
 
 from jaxident.cli.progress import working
-from jaxident.cli.session import seed_option, table, write_json, wrote
+from jaxident.cli.session import columns_option, seed_option, table, warn, write_json, wrote
 from jaxident.start import start_jax
 
 SENTENCE = {
@@ -42,8 +42,9 @@ class SeveralPerOption(click.Command):
 @click.option("--model", metavar="MODEL", help="A model to judge as it stands, effects included.")
 @click.option("--horizon", type=click.FloatRange(0, min_open=True), metavar="S", help="Seconds ahead (default: 1).")
 @click.option("--out", default="diagnosis", show_default=True, metavar="DIR", help="The folder to write.")
+@columns_option
 @seed_option
-def command(logs, sim, model, horizon, out, seed):
+def command(logs, columns, sim, model, horizon, out, seed):
     """The sim-to-real gap: where it lies, which unmodelled effect causes it, how far it shrinks with that effect.
 
     LOG: files or a folder; in a folder `sim_*` are logs of your simulator. The same logs and seed give the same result.
@@ -52,16 +53,20 @@ def command(logs, sim, model, horizon, out, seed):
     """
     start_jax()
     from jaxident.diagnosis.diagnose import diagnose
+    from jaxident.estimation.suspicions import log_suspicions
     from jaxident.files.atomic import make_folder
     from jaxident.files.diagnosis import diagnosis_to_dict
     from jaxident.files.logs import find_simulated, read_log, read_logs
     from jaxident.files.models import load_model, save_model
+    from jaxident.log import join
     from jaxident.report.diagnosis import diagnosis_page
     from jaxident.report.page import write_page
 
-    records = read_logs(logs)
+    records = read_logs(logs, columns)
     theirs = read_logs(sim) if sim else [read_log(path) for path in find_simulated(logs)]
     nominal = load_model(model) if model else None
+    warn(log_suspicions(join(records)), columns)
+    warn(f"the simulator's logs: {line}" for line in (log_suspicions(join(theirs)) if theirs else ()))
     make_folder(out)  # a folder that cannot be made is told before the work, not after it
     with working("diagnosing"):
         found = diagnose(records, sim=theirs or None, model=nominal, horizon=horizon, seed=seed)

@@ -5,7 +5,7 @@ import dataclasses
 import click
 
 from jaxident.cli.progress import working
-from jaxident.cli.session import json_option, seed_option, table, write_json, wrote
+from jaxident.cli.session import columns_option, json_option, seed_option, table, warn, write_json, wrote
 from jaxident.start import start_jax
 
 NOTES = {
@@ -56,11 +56,14 @@ NOTES = {
     show_default=True,
     help="What --bootstrap draws: blocks of residuals, or whole runs, of which it takes many.",
 )
+@columns_option
 @seed_option
 @click.option("--out", metavar="MODEL", help="The model file to write.")
 @click.option("--report", metavar="FILE", help="A page (.html): intervals, verdicts, doubts, residuals, pictures.")
 @json_option
-def command(logs, method, noise_law, coupling, d_max, reading, count, resample, seed, out, report, json_file, **paper):
+def command(
+    logs, columns, method, noise_law, coupling, d_max, reading, count, resample, seed, out, report, json_file, **paper
+):
     """The model behind one or several logs (files, folders, or `-`), runs in the order given.
 
     Example: jaxident identify log.csv --out model.json
@@ -77,7 +80,7 @@ def command(logs, method, noise_law, coupling, d_max, reading, count, resample, 
     for option in [name for name, value in (("--report", report), ("--bootstrap", count)) if value is not None]:
         if method != "maximum-likelihood":
             raise click.UsageError(f"{option} needs the method maximum-likelihood")
-    records = read_logs(logs)
+    records = read_logs(logs, columns)
     settings = {"noise_law": noise_law, "coupling": coupling, "d_max": d_max, **paper}
     with working("identifying"):
         found = identify(records, method, reading=reading and reading.replace("-", "_"), **settings)
@@ -86,7 +89,7 @@ def command(logs, method, noise_law, coupling, d_max, reading, count, resample, 
     origin = with_session(origin, join(records))
     model = dataclasses.replace(found.model, provenance=origin)
     rows = verdicts(model, max(float(abs(u).max()) for record in records for u in record.command))
-    _say(found, rows, method, again)
+    _say(found, rows, method, again, columns)
     if out:
         save_model(model, out)
         wrote(out)
@@ -95,9 +98,8 @@ def command(logs, method, noise_law, coupling, d_max, reading, count, resample, 
 
         for path in write_identification(found._replace(model=model), records, rows, report, again):
             wrote(path)
-    parameters = [row._asdict() for row in rows]
-    result = {"model": model_to_dict(model), "parameters": parameters, "suspicions": found.suspicions}
-    write_json(result | ({"bootstrap": _as_dict(again)} if again else {}), json_file)
+    result = {"parameters": [row._asdict() for row in rows], "suspicions": found.suspicions}
+    write_json({"model": model_to_dict(model)} | result | ({"bootstrap": _as_dict(again)} if again else {}), json_file)
 
 
 def _resample(found, records, count, resample, seed, d_max):
@@ -119,7 +121,7 @@ def _as_dict(again) -> dict:
     }  # fmt: skip
 
 
-def _say(found, rows, method: str, again) -> None:
+def _say(found, rows, method: str, again, columns) -> None:
     """Print the parameters, what their intervals mean, and every warning."""
     from jaxident.estimation.bootstrap import describe, interval_cells
 
@@ -131,8 +133,7 @@ def _say(found, rows, method: str, again) -> None:
     click.echo(NOTES[method])
     if again:
         click.echo(describe(again))
-    for line in found.suspicions:
-        click.echo(f"warning: {line}", err=True)
+    warn(found.suspicions, columns)
     if not bool(found.ok):
         click.echo(
             "warning: the fit did not converge: do not trust these numbers before you have looked at the log",

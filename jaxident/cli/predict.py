@@ -3,7 +3,7 @@
 import click
 
 from jaxident.cli.progress import working
-from jaxident.cli.session import json_option, write_json, wrote
+from jaxident.cli.session import columns_option, json_option, write_json, wrote
 from jaxident.errors import WorkError
 from jaxident.start import start_jax
 
@@ -19,8 +19,9 @@ from jaxident.start import start_jax
 @click.option("--session-time", type=float, metavar="S", help="Session time [s] at the first row of LOG, for effects "
               "that drift (default: as the model's provenance says).")  # fmt: skip
 @click.option("--out", required=True, metavar="CSV", help="The predictions to write (.csv or .csv.gz).")
+@columns_option
 @json_option
-def command(model, log, horizon, burn_in, stride, first, last, session_time, out, json_file):
+def command(model, log, horizon, burn_in, stride, first, last, session_time, out, columns, json_file):
     """Free runs of MODEL over LOG, each start state estimated from the rows before it alone.
 
     Example: jaxident predict model.json log.csv --horizon 100 --out predicted.csv
@@ -28,12 +29,12 @@ def command(model, log, horizon, burn_in, stride, first, last, session_time, out
     start_jax()
     from jaxident.estimation.predict import predict, prediction_error
     from jaxident.estimation.session import time_in_session
-    from jaxident.files.logs import read_log
+    from jaxident.files.logs import read_whole
     from jaxident.files.models import load_model
     from jaxident.files.predictions import write_prediction
     from jaxident.log import between
 
-    robot, whole = load_model(model), read_log(log)
+    robot, whole = load_model(model), read_whole(log, columns)
     record = between(whole, first, last)
     begin, known = time_in_session(robot, whole, record)
     begin = begin if session_time is None else session_time

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 from typing import Any
 
 import click
@@ -9,6 +10,36 @@ import click
 from jaxident.files.atomic import write_text
 
 json_option = click.option("--json", "json_file", metavar="FILE", help="Also write the result here, for programs.")
+
+
+class ColumnsOption(click.ParamType):
+    """NAME=COLUMN[:UNIT],...: columns of a file that have other names or units than a log's."""
+
+    name = "NAME=COLUMN:UNIT,..."
+
+    def convert(self, value, param, ctx):
+        """The columns by their names in a log."""
+        from jaxident.columns import parse_columns
+
+        return value if isinstance(value, dict) else parse_columns(value)
+
+
+columns_option = click.option(
+    "--columns", type=ColumnsOption(), default="", help="Columns with other names or units, as in "
+    "t=time_ms:ms,x=X:mm,theta=yaw:deg; u_r=u_l,u_l=u_r swaps the wheels, y=y:-1 turns a sign.")  # fmt: skip
+
+
+def warn(lines, columns=None) -> None:
+    """Each line as a warning on stderr; options in it name the columns of the user's file."""
+    for line in lines:
+        told = re.sub(r"(?<=[ ,`])(\w+)=(\w+)(?=[:,`])", lambda m: f"{m[1]}={_source(m[2], columns)}", line)
+        click.echo(f"warning: {told}", err=True)
+
+
+def _source(name: str, columns) -> str:
+    return columns[name].source if columns and name in columns else name
+
+
 seed_option = click.option("--seed", default=0, show_default=True, help="Makes every random result repeatable.")
 
 

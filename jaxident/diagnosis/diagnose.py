@@ -21,7 +21,8 @@ from jaxident.diagnosis.translate import to_model
 from jaxident.diagnosis.verdict import Judgement, judge
 from jaxident.effects.coordinates import ASIDE, PLACES
 from jaxident.errors import InputError
-from jaxident.log import Log
+from jaxident.estimation.suspicions import log_suspicions
+from jaxident.log import Log, join
 from jaxident.numerics import require_float64
 from jaxident.robot.model import Model
 
@@ -45,7 +46,7 @@ class Diagnosis(NamedTuple):
     the named effects, in the order in which they were accepted. visible: the gain that each effect of typical size
     would have had; below CLAIMED this input could not have shown it. replay: what faint effects come out as. surplus:
     effects that the user's simulator has and the robot has not. discovered: laws in no catalogue, which the corrected
-    model has as well."""
+    model has as well. suspicions: what the log says against itself, with the option that mends it, a line each."""
 
     verdict: str
     judgement: Judgement
@@ -65,6 +66,7 @@ class Diagnosis(NamedTuple):
     surplus: tuple[str, ...] = ()
     simulator: Simulator | None = None
     discovered: tuple[Shown, ...] = ()
+    suspicions: tuple[str, ...] = ()
 
     @property
     def not_testable(self) -> list[str]:
@@ -110,7 +112,7 @@ def diagnose(
     nominal = to_model(prepared, finding.nominal.vector, finding.law, (), None, finding.nominal)
     return Diagnosis(verdict, judgement, gap, account, where, selected, parameters, visible(known),
                      replay(known, seed), advice(verdict, judgement, laws), nominal, corrected, shrinks, prepared,
-                     finding, surplus, simulator, laws)  # fmt: skip
+                     finding, surplus, simulator, laws, log_suspicions(join(logs)))  # fmt: skip
 
 
 def check_nominal(logs: Log | Sequence[Log], sim: Log | Sequence[Log] | None, model: Model | None) -> None:

@@ -4,6 +4,7 @@ import numpy as np
 
 from jaxident.errors import InputError
 from jaxident.log import Log
+from jaxident.rules import check_pose_rate
 
 STILL_RATIO = 2.0
 """A robot that moves is displaced over many rows by more than this times its row-to-row camera error."""
@@ -12,6 +13,8 @@ STILL_RATIO = 2.0
 def check_informative(log: Log) -> None:
     """InputError with the reason if the log cannot show how the robot answers its commands."""
     seen = np.isfinite(log.x) & np.isfinite(log.y) & np.isfinite(log.theta)
+    steps = [np.diff(np.asarray(run.t)[np.isfinite(run.x)]) for run in log.runs()]
+    check_pose_rate("log", np.concatenate(steps))
     if np.count_nonzero(seen) < 3:
         raise InputError(f"{np.count_nonzero(seen)} measured poses: at least 3 are needed to see any motion")
     if all(np.ptp(np.asarray(u)) == 0.0 for u in log.command):

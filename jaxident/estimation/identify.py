@@ -18,6 +18,7 @@ from jaxident.estimation.initialise import Setup, initialise
 from jaxident.estimation.least_squares import full_covariance
 from jaxident.estimation.maximum_likelihood import Fit
 from jaxident.estimation.observations import observe_log
+from jaxident.estimation.suspicions import log_suspicions
 from jaxident.log import Log, even_period, join
 from jaxident.numerics import require_float64
 from jaxident.robot.difference import Difference
@@ -90,9 +91,9 @@ def identify(
     check_settings(1.0 if forgetting is None else forgetting, d_max, largest)
     if method == "paper":
         settings = setup_time, 1.0 if forgetting is None else forgetting, reading or "one_step"
-        return _identify_as_paper(log, d_max, *settings)
+        return _identify_as_paper(log, d_max, *settings)._replace(suspicions=log_suspicions(log))
     if method in YARDSTICKS:
-        return _identify_by_yardstick(log, method, d_max)
+        return _identify_by_yardstick(log, method, d_max)._replace(suspicions=log_suspicions(log))
     found = identify_poses(log, d_max, noise_law, coupling)
     return Identification(
         found.model, found.model.covariance, found.residuals, found.fit.ok, fit=found.fit, suspicions=found.suspicions

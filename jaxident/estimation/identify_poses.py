@@ -15,7 +15,7 @@ from jaxident.estimation.parameters import Law, names, to_vector
 from jaxident.estimation.precision import difference_covariance, spread_of
 from jaxident.estimation.prior import RATE, from_prior
 from jaxident.estimation.runs import Runs, stack_runs
-from jaxident.estimation.suspicions import log_suspicions
+from jaxident.estimation.suspicions import log_suspicions, odometry_suspicions
 from jaxident.log import Log
 from jaxident.robot.model import Model, Provenance
 
@@ -51,8 +51,7 @@ def identify_poses(log: Log, d_max: float, noise_law: str, coupling: bool) -> Po
     fit, law = fit_law(jax.tree.map(jnp.asarray, runs), jnp.asarray(d_max), noise_law, coupling)
     if not all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves((fit.robot, fit.covariance))):
         raise WorkError("the maximum-likelihood estimate is not finite: the log does not determine the model")
-    deviation = np.sqrt(np.diagonal(fit.covariance)[2:6]).reshape(2, 2)
-    suspicions = (*_suspicions(fit, law, runs, noise_law), *log_suspicions(log, fit.robot, deviation))
+    suspicions = (*_suspicions(fit, law, runs, noise_law), *log_suspicions(log), *odometry_suspicions(log, fit.robot))
     return PoseFit(_model(fit, law, float(np.median(_steps(log)))), _residuals(fit, runs, log), fit, law, suspicions)
 
 

@@ -23,7 +23,7 @@ from jaxident.estimation.joint_step import PARAMETERS, Drift, advance_belief
 from jaxident.estimation.noise_law import NOISE_LAWS
 from jaxident.estimation.parameters import NAMES
 from jaxident.estimation.runs import Runs, stack_runs
-from jaxident.log import Log
+from jaxident.log import Log, require_log
 from jaxident.numerics import require_float64
 from jaxident.robot.drive import Physical
 from jaxident.robot.model import Model, require_physical
@@ -86,6 +86,7 @@ def init(log: Log, *, d_max: Array, memory: Array = jnp.inf, noise_law: str = "w
     or several runs. Needs double precision.
     """
     require_float64("joint_filter.init")
+    require_log(log, "joint_filter.init")
     if noise_law not in NOISE_LAWS:
         raise InputError(f"noise law {noise_law!r}: choose from {', '.join(NOISE_LAWS)}")
     if len(log.runs()) != 1:

@@ -16,7 +16,7 @@ from jaxident.estimation.initialise import initialise
 from jaxident.estimation.least_squares import LOWER, Equation, equation_from, update
 from jaxident.estimation.observations import Observations, observe_log
 from jaxident.estimation.regressors import UNKNOWNS, Memory, Vector, empty_memory, next_row
-from jaxident.log import Log
+from jaxident.log import Log, require_log
 from jaxident.numerics import require_float64, safe_divide
 from jaxident.robot.difference import Difference
 from jaxident.robot.path_length import increment_between
@@ -157,6 +157,7 @@ def run(estimate: Estimate, observations: Observations) -> tuple[Estimate, tuple
 def init(log: Log, *, d_max: Array, forgetting: Array = 1.0, reading: str = "one_step") -> State:
     """State from the setup log (section VI): batch estimate, its covariance, and the last row's command and pose."""
     require_float64("recursive.init")
+    require_log(log, "recursive.init")
     observations = observe_log(log)
     setup = initialise(observations, d_max=d_max, reading=reading)
     estimate = start(setup.difference, setup.dead_zone, observations, d_max, forgetting)

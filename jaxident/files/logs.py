@@ -6,41 +6,54 @@ Row k holds the time t_k [s], the command applied from t_k until t_{k+1} and the
 import os
 import pathlib
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from jaxident.columns import Columns, make_columns
 from jaxident.errors import InputError
 from jaxident.files.atomic import writing_text
-from jaxident.files.rules import Rule, enforce, pose_rules, rising_time
 from jaxident.files.source import Source, explained
 from jaxident.files.table import read_table
-from jaxident.log import Log, first_rows
+from jaxident.log import Log, checked, join
 
 COLUMNS = ("t", "u_r", "u_l", "x", "y", "theta")
-LARGEST_RUN = 2**53
-"""Beyond this double precision no longer tells one integer from the next."""
 ROWS_PER_BLOCK = 1 << 16
 
 
-def read_log(path: Source) -> Log:
-    """One log with all runs of a file, all arrays (rows,) float64, run int64; "-" is the standard input.
+def read_log(
+    path: Source,
+    columns: Mapping[str, str] | str | None = None,
+    units: Mapping[str, str | float] | None = None,
+) -> Log:
+    """One log with all runs of a file, all arrays (rows,) float64, run int64; "-" is the standard input, a folder
+    stands for its logs (`find_logs`), one after the other.
+
+    columns, units: where the file has other names and units, as in `Log.from_dataframe`. A quaternion in columns
+    qx,qy,qz,qw may stand for theta; cells may be parted by semicolons or tabs; a time may be an ISO date (Unix time).
 
     Empty pose cells are NaN. The command of the last row of a run may be empty: it is never applied and is read as
     a repeat of the command before (0 in a run of a single row). Further columns are ignored with a UserWarning.
     InputError in one line names the file, the line and what would be right.
     """
-    table = read_table(path, [COLUMNS], optional=("run",))
-    columns = {"run": np.zeros(len(table.line))} | table.columns
-    log = Log(**columns)
-    _check(log, table.name, table.place)
-    u_r, u_l = (_repeat_last(command, log.run) for command in log.command)
-    return log._replace(u_r=u_r, u_l=u_l, run=log.run.astype(np.int64))
+    return read_whole(path, make_columns(columns, units))
 
 
-def read_logs(paths: Source | Sequence[Source]) -> list[Log]:
+def read_whole(path: Source, columns: Columns | None = None) -> Log:
+    """A file or a folder as one log; see `read_log`."""
+    return join(read_logs(path, columns)) if os.path.isdir(path) else read_file(path, columns)
+
+
+def read_file(path: Source, columns: Columns | None = None) -> Log:
+    """The log of one file; see `read_log`."""
+    table = read_table(path, [COLUMNS], optional=("run",), columns=columns)
+    filled = {"run": np.zeros(len(table.line))} | table.columns
+    return checked(Log(**filled), table.name, table.place)
+
+
+def read_logs(paths: Source | Sequence[Source], columns: Columns | None = None) -> list[Log]:
     """The logs of files and folders, in the order of `find_logs`; each may hold several runs."""
-    return [read_log(path) for path in find_logs(paths)]
+    return [read_file(path, columns) for path in find_logs(paths)]
 
 
 def find_logs(paths: Source | Sequence[Source], prefix: str = "real_") -> list[str]:
@@ -72,9 +85,9 @@ def write_log(log: Log, path: Source) -> None:
     be written, WorkError if the disk is full.
     """
     log = Log(*(np.asarray(column, float) for column in log))
-    _check(log, os.fspath(path), lambda row: f"{os.fspath(path)}, row {row}")
+    checked(log, os.fspath(path), lambda row: f"{os.fspath(path)}, row {row}")
     several = log.run[0] != log.run[-1]
-    columns = (*log[:-1], log.run.astype(np.int64)) if several else log[:-1]
+    columns = (*log,)[:-1] + ((log.run.astype(np.int64),) if several else ())
     with writing_text(path) as stream:
         stream.write(",".join((*COLUMNS, "run")[: len(columns)]) + "\n")
         for start in range(0, len(log.t), ROWS_PER_BLOCK):
@@ -105,33 +118,3 @@ def _natural(path: pathlib.Path) -> tuple:
     """Sorting key that compares runs of digits as numbers: the pieces are text and number by turns."""
     pieces = re.split(r"([0-9]+)", path.name)
     return tuple(int(piece) if k % 2 else piece for k, piece in enumerate(pieces)), path.name
-
-
-def _repeat_last(command: np.ndarray, run: np.ndarray) -> np.ndarray:
-    """Every missing command replaced by the one of the row before, 0 where that row is of another run."""
-    before = np.concatenate([[0.0], np.where(run[1:] == run[:-1], command[:-1], 0.0)])
-    return np.where(np.isnan(command), before, command)
-
-
-def _check(log: Log, name: str, place: Callable[[int], str]) -> None:
-    """InputError for the first breach of the rules that the rows of a log, all float64, keep between them."""
-    if len(log.t) == 0:
-        raise InputError(f"{name}: has no rows; a log needs two at least")
-    enforce(_rules(log), log._asdict(), place)
-    if first_rows(log).all():
-        raise InputError(f"{name}: no run has two rows; a log needs one that has")
-
-
-def _rules(log: Log) -> Iterator[Rule]:
-    yield Rule("run", ~(log.run == np.round(log.run)) | (np.abs(log.run) >= LARGEST_RUN), "it should be an integer")
-    first = first_rows(log)
-    starts = np.flatnonzero(first)
-    _, new = np.unique(log.run[starts], return_index=True)
-    again = np.zeros(len(first), bool)
-    again[np.delete(starts, new)] = True
-    yield Rule("run", again, "the rows of a run must stand together")
-    yield from rising_time(log.t, first)
-    last = np.append(first[1:], True)
-    for name, command in zip(("u_r", "u_l"), log.command, strict=True):
-        yield Rule(name, ~np.isfinite(command) & ~last, "only a run's last row may have no command")
-    yield from pose_rules(log.pose)

@@ -6,11 +6,12 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from jaxident.array_types import Pose, Wheels
+from jaxident.columns import QUATERNION, Column, Columns
 from jaxident.errors import InputError
-from jaxident.files.rules import Rule, enforce, ordered_time, pose_rules
 from jaxident.files.source import Source
 from jaxident.files.table import Table, read_table
 from jaxident.log import Log, make_log
+from jaxident.rules import Rule, check_pose_rate, enforce, ordered_time, pose_rules
 
 ROUNDING = 1e-3
 """Rounding of time stamps, in periods: a command that comes this much after a row is still the row's own."""
@@ -18,8 +19,13 @@ SAME_TIME = 1e-6
 """Times less than this [s] apart are one: adding an offset to decimal stamps moves them by a rounding error."""
 MOST_ROWS = 20_000_000
 """Most rows of an even log; more than that is two clocks mistaken for one."""
-_CLOCK = "are both streams on one clock? pose_offset is added to the times of the poses"
-
+UNIX = 1e8
+"""Times above this [s] count from 1970: as a robot's time of operation they would be three years."""
+OTHER_UNIT = 100.0
+"""Ratio of the lengths of two recordings beyond which their times have different units."""
+WHEELS = ("u_r", "u_l")
+FEWEST = 30
+"""Entries of a stream whose length in time means something."""
 
 Signal = TypeVar("Signal", Wheels, Pose)
 
@@ -45,13 +51,16 @@ class Poses(NamedTuple):
     pose: Pose
 
 
-def read_commands(path: Source) -> Commands:
+def read_commands(path: Source, columns: Columns | None = None) -> Commands:
     """Commands from CSV with the header t,v,w or t,u_r,u_l; InputError names the line at fault.
 
     The file follows the rules of a log's: plain or gzipped, further columns ignored with a UserWarning, finite
-    numbers only; no cell may be empty. Time must not go back; recorders that round it give equal times.
+    numbers only; no cell may be empty. Time must not go back; recorders that round it give equal times. columns: those
+    that have other names or units in the file; names of the other stream are passed over.
     """
-    table = read_table(path, [("t", "v", "w"), ("t", "u_r", "u_l")])
+    table = read_table(
+        path, [("t", *Speeds._fields), ("t", *WHEELS)], columns=_own(columns, (*Speeds._fields, *WHEELS))
+    )
     _check_times(table)
     t, *values = table.columns.items()
     both = (Rule(name, np.isnan(column), "a command has both values") for name, column in values)
@@ -60,9 +69,9 @@ def read_commands(path: Source) -> Commands:
     return Commands(t[1], kind(*(column for _, column in values)))
 
 
-def read_poses(path: Source) -> Poses:
+def read_poses(path: Source, columns: Columns | None = None) -> Poses:
     """Poses from CSV with the header t,x,y,theta, rules as in `read_commands`; rows without a pose are left out."""
-    table = read_table(path, [("t", *Pose._fields)])
+    table = read_table(path, [("t", *Pose._fields)], columns=_own(columns, (*Pose._fields, *QUATERNION)))
     _check_times(table)
     t, *pose = table.columns.values()
     enforce(pose_rules(Pose(*pose)), table.columns, table.place)
@@ -70,6 +79,11 @@ def read_poses(path: Source) -> Poses:
     if not seen.any():
         raise InputError(f"{table.name}: no row has a pose")
     return Poses(t[seen], Pose(*(column[seen] for column in pose)))
+
+
+def _own(columns: Columns | None, names: tuple[str, ...]) -> dict[str, Column]:
+    """Those of the columns that a stream has."""
+    return {name: column for name, column in (columns or {}).items() if name in ("t", *names)}
 
 
 def merge(
@@ -91,13 +105,14 @@ def merge(
     `period` [s] the rows are t_0 + k period from the first command on, each with the command in force and the
     nearest pose within half a period or NaN; each pose is used once at most.
 
-    Of several commands or poses at one time the last counts, with a UserWarning; another tells of poses that all
-    come after the last command. InputError for a setting out of range, speeds without a track, wheel commands with
-    one, times that go back, and poses that all come before the first command.
+    Of several commands or poses at one time the last counts, with a UserWarning. InputError for a setting out of range,
+    speeds without a track, wheel commands with one, times that go back, streams that do not overlap or whose times
+    have other units.
     """
     _check_settings(pose_offset, period=period, track=track, hold_timeout=hold_timeout)
-    command_t, wheels = _latest("commands", commands.t, _wheel_speeds(commands.value, track))
+    command_t, wheels = _latest("commands", commands.t, wheel_speeds(commands.value, track))
     pose_t, pose = _latest("poses", np.asarray(poses.t) + pose_offset, poses.pose)
+    check_pose_rate("poses", np.diff(pose_t))
     _check_overlap(command_t, pose_t)
     end = max(command_t[-1], pose_t[-1])
     held_t, held = _expire(command_t, wheels, hold_timeout, end)
@@ -122,7 +137,8 @@ def _by_period(held_t: np.ndarray, pose_t: np.ndarray, end: float, period: float
     rows = np.floor((end - held_t[0]) / period + ROUNDING) + 1
     if rows > MOST_ROWS:
         raise InputError(
-            f"period: {period:g} s makes {rows:.3g} rows between {held_t[0]:.10g} s and {end:.10g} s; {_CLOCK}"
+            f"period: {period:g} s makes {rows:.3g} rows between {held_t[0]:.10g} s and {end:.10g} s; are both streams "
+            "on one clock?"
         )
     row = np.arange(int(rows))
     in_force = np.searchsorted((held_t - held_t[0]) / period, row + ROUNDING, side="right") - 1
@@ -136,7 +152,8 @@ def _by_period(held_t: np.ndarray, pose_t: np.ndarray, end: float, period: float
     return held_t[0] + period * row, in_force, pose_row
 
 
-def _wheel_speeds(value: Wheels | Speeds, track: float | None) -> Wheels:
+def wheel_speeds(value: Wheels | Speeds, track: float | None) -> Wheels:
+    """Commands as those of the wheels; InputError for speeds without a track, wheel commands with one."""
     if isinstance(value, Wheels):
         if track is not None:
             raise InputError("track: the commands are u_r,u_l already; leave it out")
@@ -178,15 +195,22 @@ def _latest(name: str, t: Any, value: Signal) -> tuple[np.ndarray, Signal]:
 
 
 def _check_overlap(command_t: np.ndarray, pose_t: np.ndarray) -> None:
-    if pose_t[-1] < command_t[0]:
+    """InputError for two streams without a time in common, or with times in different units."""
+    lengths = float(np.ptp(command_t)), float(np.ptp(pose_t))
+    if min(len(command_t), len(pose_t)) > FEWEST and max(lengths) > OTHER_UNIT * min(lengths):
         raise InputError(
-            f"poses: the last comes at {pose_t[-1]:.10g} s, before the first command at {command_t[0]:.10g} s; {_CLOCK}"
+            f"the commands last {lengths[0]:.6g} s and the poses {lengths[1]:.6g} s: are the times of one in another "
+            "unit? --command-columns t=t:ms or --pose-columns t=t:ms takes them for milliseconds"
         )
-    if len(command_t) > 1 and pose_t[0] > command_t[-1]:
-        warnings.warn(
-            f"the first pose comes at {pose_t[0]:.10g} s, after the last command at {command_t[-1]:.10g} s; {_CLOCK}",
-            stacklevel=3,
-        )
+    if pose_t[-1] >= command_t[0] and (len(command_t) == 1 or pose_t[0] <= command_t[-1]):
+        return
+    names = [name for name, t in (("commands", command_t), ("poses", pose_t)) if t[0] > UNIX]
+    unix = f"; the {names[0]} are in Unix time, the others not" if len(names) == 1 else ""
+    raise InputError(
+        f"the streams do not overlap: commands from {command_t[0]:.10g} to {command_t[-1]:.10g} s, poses from "
+        f"{pose_t[0]:.10g} to {pose_t[-1]:.10g} s{unix}: are both streams on one clock? --pose-offset auto finds the "
+        "time to add to the poses, a number sets it"
+    )
 
 
 def _check_times(table: Table) -> None:

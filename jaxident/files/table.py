@@ -17,6 +17,7 @@ from typing import Any, NamedTuple, TextIO
 
 import numpy as np
 
+from jaxident.columns import QUATERNION, Column, Columns, heading_of, iso_seconds, rename, split_heading
 from jaxident.errors import InputError
 from jaxident.files.source import Source, explained
 
@@ -40,29 +41,56 @@ class Table(NamedTuple):
         return f"{self.name}, line {self.line[row]}"
 
 
-def read_table(path: Source, layouts: Sequence[Layout], optional: Layout = ()) -> Table:
+def read_table(path: Source, layouts: Sequence[Layout], optional: Layout = (), columns: Columns | None = None) -> Table:
     """The columns of the one layout that the file's header holds, and the optional ones that it has.
 
     UTF-8, with or without byte-order mark, plain or gzipped (told by content), any line ends, columns in any order,
     blank lines ignored; "-" is the standard input. Cells are finite decimal numbers or empty. Further columns are
     ignored with a UserWarning. InputError names the line and the column at fault.
+
+    columns: those that have other names or units in the file. Four columns qx,qy,qz,qw stand for a theta that is not
+    there. Semicolons or tabs may part the cells, decimal commas beside them; t may be an ISO date (then Unix time).
     """
     name = "standard input" if os.fspath(path) == "-" else os.fspath(path)
     with explained(name, "CSV"), _open_text(path) as stream:
-        header, lines_read = _read_header(stream, name, layouts)
+        header, lines_read, separator = _read_header(stream, name, layouts)
+        columns, change = split_heading(header, columns or {})
+        header = rename(header, columns, f"{name}, line {lines_read}")
+        layouts = [_with_quaternion(layout, header) for layout in layouts]
         wanted = _choose(header, f"{name}, line {lines_read}", layouts, optional)
         ignored = [column for column in header if column not in wanted]
         if ignored:
             warnings.warn(f"{name}: columns ignored: {', '.join(map(repr, ignored))}", stacklevel=2)
         values, line = [np.empty((0, len(wanted)))], [np.empty(0, int)]
-        while lines := stream.readlines(BLOCK_BYTES):
+        while lines := [_with_commas(line, separator) for line in stream.readlines(BLOCK_BYTES)]:
             filled = np.array([k for k, text in enumerate(lines) if not text.isspace()], int)
             number = lines_read + 1 + filled
             values.append(_read_block([lines[k] for k in filled], header, wanted, name, number))
             line.append(number)
             lines_read += len(lines)
-    columns = dict(zip(wanted, np.concatenate(values).T.copy(), strict=True))
-    return Table(name, columns, np.concatenate(line))
+    found = dict(zip(wanted, np.concatenate(values).T.copy(), strict=True))
+    return Table(name, _in_si(found, columns, change), np.concatenate(line))
+
+
+def _in_si(found: dict[str, np.ndarray], columns: Columns, change: Column | None) -> dict[str, np.ndarray]:
+    """The columns in SI, a quaternion as the heading that it stands for."""
+    found = {name: columns[name].convert(values) if name in columns else values for name, values in found.items()}
+    if QUATERNION[0] in found:
+        found["theta"] = heading_of(*(found.pop(name) for name in QUATERNION))
+        found["theta"] = change.convert(found["theta"]) if change else found["theta"]
+    return found
+
+
+def _with_quaternion(layout: Layout, header: list[str]) -> Layout:
+    """The layout with a quaternion in place of a theta that the header lacks."""
+    if "theta" not in layout or "theta" in header or not set(QUATERNION) <= set(header):
+        return layout
+    return (*(name for name in layout if name != "theta"), *QUATERNION)
+
+
+def _with_commas(line: str, separator: str) -> str:
+    """A line whose cells commas part; where another sign parted them, commas in it were decimal points."""
+    return line if separator == "," else line.replace(",", ".").replace(separator, ",")
 
 
 def _read_block(lines: list[str], header: list[str], wanted: Layout, name: str, number: np.ndarray) -> np.ndarray:
@@ -101,6 +129,8 @@ def _parse_line(line: str, number: int, header: list[str], wanted: Layout, name:
 def _parse_cell(cell: str, column: str, place: str) -> float:
     if not cell:
         return np.nan
+    if column == "t" and (stamp := iso_seconds(cell)) is not None:
+        return stamp
     if not _NUMBER.fullmatch(cell):
         raise InputError(f"{place}, column {column}: {_quoted(cell)} is not a finite decimal number")
     value = float(cell)
@@ -118,14 +148,15 @@ def _quoted(text: str, longest: int = 40) -> str:
     return repr(text if len(text) <= longest else text[:longest] + "...")
 
 
-def _read_header(stream: TextIO, name: str, layouts: Sequence[Layout]) -> tuple[list[str], int]:
-    """The first line that is not blank, cut into its names, and its number."""
+def _read_header(stream: TextIO, name: str, layouts: Sequence[Layout]) -> tuple[list[str], int, str]:
+    """The first line that is not blank, cut into its names, its number, and the sign that parts its cells."""
     expected = " or ".join(map(",".join, layouts))
     for number, line in enumerate(iter(lambda: stream.readline(LONGEST_HEADER), ""), 1):
         if "\0" in line or "\ufffd" in line or len(line) == LONGEST_HEADER:
             raise InputError(f"{name}: is not a text file in UTF-8; it should be CSV with the header {expected}")
         if not line.isspace():
-            return _split(line), number
+            separator = max(",;\t", key=line.count)  # a comma where none is there
+            return _split(_with_commas(line, separator)), number, separator
     raise InputError(f"{name}: is empty; it should begin with the header {expected}")
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 
+from jaxident.files.any_log import as_log
 from jaxident.log import Log
 from jaxident.plot import style
 from jaxident.plot.names import LENGTH, TURN
@@ -23,6 +24,7 @@ def path(log: Log, prediction: "Prediction | None" = None, *, ax: Axes | None = 
 
     The thin line joins the rows that were seen, across those that were not. Equal scales in x and y.
     """
+    log = as_log(log)
     ax = style.axes_or_new(ax, (style.WIDTH, 4.5))
     for number, run in enumerate(log.runs()):
         x, y, theta = (np.asarray(column, float) for column in run.pose)

@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from jaxident.array_types import Increment
+from jaxident.files.any_log import as_log
 from jaxident.log import Log
 from jaxident.plot import style
 from jaxident.plot.names import LENGTH, TURN
@@ -45,6 +46,7 @@ def commands(log: Log, *, ax: Axes | None = None, dead_zone: Sequence[float] | N
 
     Several runs follow one another, divided by thin lines, on the session time: the sum of the durations before.
     """
+    log = as_log(log)
     ax = style.axes_or_new(ax)
     runs = log.runs()
     wheels = (("right wheel", style.RIGHT, "u_r"), ("left wheel", style.LEFT, "u_l"))

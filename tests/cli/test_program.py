@@ -7,16 +7,10 @@ import sys
 
 import numpy as np
 import pytest
+from support.program import jaxident, refused
 
 from jaxident.files.logs import read_log
 from jaxident.files.models import load_model
-
-
-def jaxident(*words, cwd=None, stdin=None):
-    return subprocess.run(
-        [sys.executable, "-m", "jaxident", *map(str, words)],
-        capture_output=True, text=True, cwd=cwd, input=stdin, check=False, timeout=300,
-    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -32,15 +26,6 @@ def folder(tmp_path_factory):
     assert "dead_zone_r" in found.stdout
     assert "wrote" in found.stdout
     return folder
-
-
-def refused(result, *words):
-    """Exit code 2 and one line on stderr that holds the words."""
-    assert result.returncode == 2, result
-    assert result.stdout == ""
-    assert len(result.stderr.splitlines()) == 1, result.stderr
-    for word in words:
-        assert word in result.stderr
 
 
 def test_help_names_every_command():

@@ -181,7 +181,7 @@ def test_coloured_residuals_are_suspected():
         (lambda log: log._replace(x=1e3 * log.x, y=1e3 * log.y), "millimetres"),
         (lambda log: log._replace(u_r=log.u_l, u_l=log.u_r), "swapped"),
         (lambda log: log._replace(u_r=-log.u_r), "right wheel"),
-        (lambda log: log._replace(u_r=np.roll(log.u_r, -4), u_l=np.roll(log.u_l, -4)), "only 4 rows"),
+        (lambda log: log._replace(u_r=np.roll(log.u_r, -4), u_l=np.roll(log.u_l, -4)), "4.0 rows) late"),
     ],
 )
 def test_what_users_trip_over_is_suspected_after_any_fit(changed, words):

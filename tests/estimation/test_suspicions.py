@@ -1,13 +1,14 @@
 """What users trip over is said, and clean logs are left in peace: the simulator under many inputs and noises."""
 
 import dataclasses
+import re
 
 import jax
 import numpy as np
 import pytest
 
 from jaxident.estimation.parameters import Robot
-from jaxident.estimation.suspicions import log_suspicions, motions
+from jaxident.estimation.suspicions import log_suspicions, motions, odometry_suspicions
 from jaxident.files.models import load_model
 from jaxident.log import Log, join
 from jaxident.robot.drive import Physical
@@ -27,9 +28,9 @@ def made(kind="multilevel", noise=CAMERA, effect=None, seed=0):
     return simulate_runs(robot, inputs, noise=noise, key=jax.random.key(seed + 9))
 
 
-def said(log, gain=DRIVE.gain):
-    robot = Robot(DRIVE._replace(gain=gain), np.asarray(ROBOT.dead_zone), Noise(*CAMERA))
-    return log_suspicions(log, robot, 0.01 * np.abs(np.asarray(gain)))
+def said(log):
+    robot = Robot(DRIVE, np.asarray(ROBOT.dead_zone), Noise(*CAMERA))
+    return log_suspicions(log) + odometry_suspicions(log, robot)
 
 
 @pytest.fixture(scope="module")
@@ -69,30 +70,48 @@ def test_frames_and_units_of_the_heading(changed, words, noise):
 
 
 @pytest.mark.parametrize(
-    ("signs", "words"),
+    ("columns", "words"),
     [
-        ([[1, 1], [-1, -1]], "swapped"),
-        ([[-1, -1], [-1, -1]], "both wheels run backwards"),
-        ([[-1, -1], [1, 1]], "marker"),
-        ([[-1, 1], [-1, 1]], "right wheel"),
-        ([[1, -1], [1, -1]], "left wheel"),
+        ("u_r=u_l,u_l=u_r", "swapped (`--columns u_r=u_l,u_l=u_r`)"),
+        ("y=y:-1,theta=theta:-1", "y points down (`--columns y=y:-1,theta=theta:-1`)"),
+        (
+            "u_r=u_r:-1,u_l=u_l:-1",
+            "both wheels run backwards under positive commands: `--columns u_r=u_r:-1,u_l=u_l:-1`",
+        ),
+        ("theta=theta:rad+3.14159", "half a turn (`--columns theta=theta:rad+3.14159`)"),
+        ("u_r=u_r:-1", "right wheel runs backwards under positive commands: `--columns u_r=u_r:-1`"),
+        ("u_l=u_l:-1", "left wheel runs backwards under positive commands: `--columns u_l=u_l:-1`"),
+        ("theta=theta:180", "degrees: `--columns theta=theta:deg`"),
+        ("x=x:1000,y=y:1000", "positions in millimetres instead of metres? `--columns x=x:mm,y=y:mm`"),
     ],
 )
-def test_wheels_that_push_the_wrong_way(log, signs, words):
-    (line,) = said(log, np.asarray(DRIVE.gain) * np.array(signs))
+def test_what_is_wrong_is_said_with_the_option_that_mends_it(log, columns, words):
+    """Each change is its own opposite, or the words name the opposite: the mended log is left in peace."""
+    wrong = Log.from_dataframe(log._asdict(), columns.replace(":180", f":{180 / np.pi}"))
+    (line,) = said(wrong)
     assert words in line
+    option = re.findall(r"--columns ([^`]*)`", line)[-1 if "points down" in words or "swapped" not in line else 0]
+    assert said(Log.from_dataframe(wrong._asdict(), option)) == ()
 
 
-def test_millimetres_for_metres(log):
-    large = log._replace(x=1e3 * log.x, y=1e3 * log.y)
-    (line,) = said(large, np.asarray(DRIVE.gain) * np.array([[1e3], [1.0]]))
-    assert "millimetres" in line
-
-
-@pytest.mark.parametrize(("delay", "rows"), [(0.02, None), (0.07, 2), (0.1, 3), (0.2, 6)])
+@pytest.mark.parametrize(("delay", "rows"), [(0.02, None), (0.07, "2.1"), (0.1, "3.0"), (0.2, "6.0")])
 def test_delays_of_several_rows(delay, rows):
     lines = said(made(effect=Effect("transport_delay", {"delay": delay})))
-    assert lines == () if rows is None else f"only {rows} rows" in lines[0]
+    if rows is None:
+        assert lines == ()
+    else:
+        assert "late: a delay" in lines[0]
+        assert f"`jaxident convert --pose-offset -{delay:g}" in lines[0]
+
+
+@pytest.mark.parametrize("rows", [1, 3, 9])
+def test_poses_of_a_clock_that_is_ahead(log, rows):
+    """What a robot does before it is told to is no delay."""
+    early = log[:-rows]._replace(**{c: getattr(log, c)[rows:] for c in ("x", "y", "theta")})
+    (line,) = said(early)
+    assert "before it is told to: the poses have another clock" in line
+    offset = float(re.search(r"--pose-offset ([-0-9.]+)`", line)[1])
+    assert offset == pytest.approx(rows * ROBOT.sample_period, abs=0.004)
 
 
 def test_a_motor_lag_is_no_delay():

@@ -173,7 +173,8 @@ def test_a_bad_run_number_is_named(tmp_path, rows, reason):
         (b"\n\n", "is empty"),
         (b"t,u_r,x,y,theta\n", "line 1: no column u_l in the header 't,u_r,x,y,theta'; it should be t,u_r,u_l,"),
         (b"\n0,1,2,0,0,0\n", "line 2: no column t in the header '0,1,2,0,0,0'"),
-        (b"t;u_r;u_l;x;y;theta\n", "line 1: no column t in the header 't;u_r"),
+        (b"t;u_r;u_l;x;y;theta\n", "has no rows; a log needs two"),
+        (b"t|u_r|u_l\n", "line 1: no column t in the header 't[|]u_r"),
         (b"t,u_r,u_l,x,y,theta,t\n", "line 1: column t appears 2 times; keep one"),
         (b"t,u_r,u_l,x,y,theta,run,run\n", "line 1: column run appears 2 times"),
         (bytes(range(256)), "is not a text file in UTF-8"),
@@ -195,7 +196,7 @@ def test_a_file_that_is_no_log_is_refused(tmp_path, content, reason):
 def test_a_path_that_is_no_file_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"none\.csv: no such file"):
         read_log(tmp_path / "none.csv")
-    with pytest.raises(InputError, match="is a folder, not a CSV file"):
+    with pytest.raises(InputError, match="the folder holds no logs"):
         read_log(tmp_path)
     with pytest.raises(InputError, match="cannot be read: Not a directory"):
         read_log(save(tmp_path, HEADER + GOOD) / "log.csv")

@@ -130,10 +130,23 @@ def test_of_several_entries_at_one_time_the_last_counts():
         assert merge(commands((0.0, 1, 1), (1.0, 1, 1)), twice).x.tolist()[0] == 2.0
 
 
-def test_poses_after_the_last_command_are_kept_with_a_warning():
-    with pytest.warns(UserWarning, match="the first pose comes at 5 s, after the last command at 1 s; are both"):
-        log = merge(commands((0.0, 1, 1), (1.0, 2, 2)), poses(5.0))
-    assert table(log)[-1] == (5.0, 2, 2, 5.5)
+def test_streams_that_do_not_overlap_are_refused():
+    with pytest.raises(InputError, match=r"do not overlap: commands from 0 to 1 s, poses from 5 to 5 s: are"):
+        merge(commands((0.0, 1, 1), (1.0, 2, 2)), poses(5.0))
+    assert table(merge(commands((0.0, 1, 1)), poses(5.0)))[-1] == (5.0, 1, 1, 5.5)
+    with pytest.raises(InputError, match=r"the poses are in Unix time, the others not: .* --pose-offset auto"):
+        merge(*BOTH, pose_offset=1.7e9)
+
+
+def test_times_in_another_unit_are_refused():
+    t = 0.03 * np.arange(100)
+    given, seen = Commands(t, Wheels(t, t)), Poses(t, Pose(t, t, t))
+    with pytest.raises(InputError, match=r"the poses are 30 s apart; .* --columns t=t:ms takes them for ms"):
+        merge(given, seen._replace(t=1e3 * t))
+    with pytest.raises(InputError, match=r"the poses are 3e[+]07 s apart; .* --columns t=t:ns takes"):
+        merge(given, seen._replace(t=1e9 * t))
+    with pytest.raises(InputError, match=r"commands last 2970 s and the poses 2.97 s: .* --command-columns t=t:ms"):
+        merge(given._replace(t=1e3 * t), seen)
 
 
 BOTH = commands((0.0, 1, 1), (1.0, 2, 2)), poses(0.0, 1.0)
@@ -151,7 +164,7 @@ SPEEDS = Commands(np.array([0.0, 1.0]), Speeds(np.ones(2), np.ones(2))), BOTH[1]
         (BOTH, {"period": math.inf}, "period: is inf"),
         (BOTH, {"hold_timeout": 0.0}, "hold_timeout: is 0; it should be positive"),
         (BOTH, {"pose_offset": NAN}, "pose_offset: is nan; it should be a finite time"),
-        (BOTH, {"pose_offset": -1.5}, "poses: the last comes at -0.5 s, before the first command at 0 s; are both"),
+        (BOTH, {"pose_offset": -1.5}, "do not overlap: commands from 0 to 1 s, poses from -1.5 to -0.5 s: are both"),
         (BOTH, {"period": 2.0}, "a log of a single row, at 0 s"),
         (BOTH, {"period": 1e-9}, "period: 1e-09 s makes 1e[+]09 rows between 0 s and 1 s; are both streams on one"),
         ((BOTH[0], poses(1.0, 0.0)), {}, "poses, entry 1, column t: is 0; time must not go back"),
@@ -162,14 +175,6 @@ SPEEDS = Commands(np.array([0.0, 1.0]), Speeds(np.ones(2), np.ones(2))), BOTH[1]
 def test_a_wrong_setting_or_stream_is_named(streams, settings, reason):
     with pytest.raises(InputError, match=reason):
         merge(*streams, **settings)
-
-
-def test_a_clock_that_is_another_does_not_fill_the_memory():
-    with (
-        pytest.warns(UserWarning, match="are both streams on one clock"),
-        pytest.raises(InputError, match="are both streams on one clock"),
-    ):
-        merge(BOTH[0], poses(1.7e9), period=0.01)
 
 
 def save(folder, text):

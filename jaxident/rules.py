@@ -1,12 +1,19 @@
 """Rules that the rows of a table keep, and the one error line for the first row that does not."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from jaxident.array_types import Pose
 from jaxident.errors import InputError
+
+SLOWEST, FASTEST = 2.0, 5e-4
+"""Steps [s] between the poses of a camera: beyond these a robot is not followed, and the unit of time is another."""
+USUAL_STEP = 0.03
+"""Step [s] between the poses of a usual camera, between which units are guessed."""
+FEWEST_STEPS = 20
+"""Steps whose median tells a rate."""
 
 
 class Rule(NamedTuple):
@@ -44,3 +51,19 @@ def pose_rules(pose: Pose) -> Iterator[Rule]:
     blind = np.isnan(np.stack(pose)).all(axis=0)
     for name, column in pose._asdict().items():
         yield Rule(name, ~np.isfinite(column) & ~blind, "a pose has three cells, or none where nothing was measured")
+
+
+def check_pose_rate(name: str, steps: Any) -> None:
+    """InputError where the median step between poses (steps,) is none of a camera; names the right unit."""
+    if len(steps) < FEWEST_STEPS:
+        return
+    median = float(np.median(steps))
+    if FASTEST <= median <= SLOWEST:
+        return
+    scale = {unit: median / size for unit, size in (("ms", 1e3), ("us", 1e6), ("ns", 1e9), ("min", 1.0 / 60.0))}
+    unit = min(scale, key=lambda unit: abs(np.log(max(scale[unit], 1e-300) / USUAL_STEP)))
+    option = f": --columns t=t:{unit} takes them for {unit}" if FASTEST <= scale[unit] <= SLOWEST else ""
+    raise InputError(
+        f"{name}: the poses are {median:.4g} s apart; {FASTEST:g} to {SLOWEST:g} s are read. Are the times in another "
+        f"unit{option}?"
+    )

@@ -1,0 +1,39 @@
+"""The functions of the floors below as users call them: where they take a log, they take whatever may stand for one."""
+
+import functools
+import inspect
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from jaxident.diagnosis import diagnose as diagnosing
+from jaxident.effects import simulate as simulating
+from jaxident.estimation import bootstrap as resampling
+from jaxident.estimation import identify as identifying
+from jaxident.estimation import precision
+from jaxident.estimation import predict as predicting
+from jaxident.files.any_log import as_log, as_logs
+
+Function = TypeVar("Function", bound=Callable)
+
+
+def taking(function: Function, **readers: Callable[[Any], Any]) -> Function:
+    """The function, some of its arguments read first by `readers`; None stays None."""
+    signature = inspect.signature(function)
+
+    @functools.wraps(function)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        bound = signature.bind(*args, **kwargs)
+        for name, read in readers.items():
+            if bound.arguments.get(name) is not None:
+                bound.arguments[name] = read(bound.arguments[name])
+        return function(*bound.args, **bound.kwargs)
+
+    return call  # type: ignore[return-value]
+
+
+identify = taking(identifying.identify, logs=as_logs)
+diagnose = taking(diagnosing.diagnose, logs=as_logs, sim=as_logs)
+bootstrap = taking(resampling.bootstrap, logs=as_logs)
+predict = taking(predicting.predict, log=as_log)
+simulate = taking(simulating.simulate, log=as_log)
+cramer_rao = taking(precision.cramer_rao, inputs=as_logs)

@@ -1,0 +1,231 @@
+"""ROS bags to streams: ROS 1, and ROS 2 as sqlite3 or MCAP, read by `rosbags` (the extra `ros`).
+
+Messages are read one by one and nothing but their numbers is kept, so that a bag may be larger than the memory.
+"""
+
+import contextlib
+import os
+import pathlib
+import warnings
+from array import array
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jaxident.array_types import Pose, Wheels
+from jaxident.columns import QUATERNION, Columns, heading_of, make_columns, seconds
+from jaxident.errors import InputError
+from jaxident.files.messages import COMMANDS, POSES, Choice, MessageReader
+from jaxident.files.streams import Commands, Poses, Speeds, merge
+from jaxident.log import Log
+
+UNREADABLE = "is no bag that can be read"
+
+
+class Topic(NamedTuple):
+    """A topic of a bag: messages, their mean rate [1/s] (NaN below two), and what it could be: "commands", "poses" or
+    "" for a type that has no reader."""
+
+    name: str
+    type: str
+    messages: int
+    rate: float
+    suits: str
+
+
+class BagStream(NamedTuple):
+    """What a topic held: times [s], columns (v, w), (u_r, u_l) or (x, y, theta), and notes, a line each."""
+
+    t: np.ndarray
+    columns: dict[str, np.ndarray]
+    notes: tuple[str, ...]
+
+
+def list_topics(path: str | os.PathLike) -> list[Topic]:
+    """The topics of a bag, by name. InputError for what is no bag."""
+    with open_bag(path) as reader:
+        return _topics(reader)
+
+
+def read_bag(
+    path: str | os.PathLike,
+    command_topic: str | None = None,
+    pose_topic: str | None = None,
+    *,
+    child_frame: str | None = None,
+    wheel_order: tuple[str, str] | None = None,
+    bag_time: bool = False,
+    columns: Mapping[str, str] | str | None = None,
+    units: Mapping[str, str | float] | None = None,
+    **settings: Any,
+) -> Log:
+    """One log from two topics of a bag; `settings` (period, track, pose_offset, hold_timeout) go to `merge`.
+
+    A topic that is left out is the only one that looks right. child_frame: which transform of a tf topic is the robot.
+    wheel_order: indices (Float64MultiArray) or joint names (JointState) of the right and the left wheel. bag_time: the
+    time of recording in place of the headers' stamps. columns, units: changes to the columns v,w or u_r,u_l and
+    x,y,theta as in `Log.from_dataframe`. InputError names what is wrong and what there is.
+    """
+    chosen, choice = make_columns(columns, units), Choice(child_frame, wheel_order, bag_time)
+    commands, poses, notes = read_bag_streams(path, command_topic, pose_topic, choice, chosen)
+    for note in notes:
+        warnings.warn(note, stacklevel=2)
+    return merge(commands, poses, **settings)
+
+
+def read_bag_streams(
+    path: str | os.PathLike,
+    command_topic: str | None,
+    pose_topic: str | None,
+    choice: Choice,
+    columns: Columns | None = None,
+) -> tuple[Commands, Poses, tuple[str, ...]]:
+    """Commands and poses of a bag, and what is worth knowing of them, a line each; see `read_bag`."""
+    with open_bag(path) as reader:
+        topics = _topics(reader)
+        first, first_note = _chosen(path, topics, command_topic, "commands")
+        second, second_note = _chosen(path, topics, pose_topic, "poses")
+        command = _read_topic(path, reader, first, COMMANDS, choice._replace(child_frame=None))
+        pose = _read_topic(path, reader, second, POSES, choice)
+    values = [_in_si(stream.columns, columns or {}) for stream in (command, pose)]
+    kind = Speeds if "v" in values[0] else Wheels
+    notes = (*first_note, *second_note, *command.notes, *pose.notes)
+    seen = np.isfinite(np.stack(list(values[1].values()))).all(axis=0)
+    measured = Pose(**{name: column[seen] for name, column in values[1].items()})
+    return Commands(command.t, kind(*values[0].values())), Poses(pose.t[seen], measured), notes
+
+
+def _in_si(found: dict[str, np.ndarray], columns: Columns) -> dict[str, np.ndarray]:
+    """The columns as `columns` has them; those that it does not name stay as they are."""
+    taken = {name: columns[name] for name in found if name in columns}
+    for name, column in taken.items():
+        if column.source not in found:
+            raise InputError(f"columns: {name}={column.source}: the topic has the columns {', '.join(found)}")
+    return found | {name: column.convert(found[column.source]) for name, column in taken.items()}
+
+
+@contextlib.contextmanager
+def open_bag(path: str | os.PathLike) -> Iterator[Any]:
+    """A reader of the bag; whatever goes wrong in it is one InputError that names the bag."""
+    try:
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError:
+        raise InputError("bags are read by rosbags, which is not installed: pip install 'jaxident[ros]'") from None
+    if not os.path.exists(path):
+        raise InputError(f"{path}: no such file or folder")
+    try:
+        with AnyReader([pathlib.Path(path)], default_typestore=get_typestore(Stores.LATEST)) as reader:
+            yield reader
+    except (InputError, GeneratorExit):
+        raise
+    except Exception as error:  # a damaged bag fails in the reader, in YAML, in SQLite, in a decompressor ...
+        told = " ".join(str(error).split()) or type(error).__name__
+        raise InputError(
+            f"{path}: {UNREADABLE} ({told[:200]}); record or copy it again, or try `ros2 bag reindex`"
+        ) from error
+
+
+def _topics(reader: Any) -> list[Topic]:
+    spans = [(max(one.end_time - one.start_time, 0)) / 1e9 for one in reader.readers if one.message_count]
+    length = max(spans, default=0.0)
+    found = []
+    for name, info in sorted(reader.topics.items()):
+        kind = info.msgtype or "several types"
+        suits = "commands" if kind in COMMANDS else "poses" if kind in POSES else ""
+        rate = (info.msgcount - 1) / length if info.msgcount > 1 and length > 0.0 else np.nan
+        found.append(Topic(name, kind, info.msgcount, rate, suits))
+    return found
+
+
+def _chosen(path: Any, topics: list[Topic], wanted: str | None, what: str) -> tuple[Topic, tuple[str, ...]]:
+    """The topic of that name, or the only one with messages that looks right, which is then told."""
+    there = ", ".join(f"{topic.name} ({topic.type})" for topic in topics) or "none at all"
+    if wanted is not None:
+        found = next((topic for topic in topics if topic.name == wanted), None)
+        if found is None:
+            raise InputError(f"{path}: no topic {wanted!r}; there are {there}")
+        readers = COMMANDS if what == "commands" else POSES
+        if found.type not in readers:
+            raise InputError(f"{path}: {wanted} has the type {found.type}, of which no {what} are read; "
+                             f"readable are {', '.join(readers)}")  # fmt: skip
+        if not found.messages:
+            raise InputError(f"{path}: {wanted} has no messages; topics are {there}")
+        return found, ()
+    fitting = [topic for topic in topics if topic.suits == what and topic.messages]
+    option = "--command-topic" if what == "commands" else "--pose-topic"
+    if len(fitting) != 1:
+        listed = ", ".join(topic.name for topic in fitting) or "none"
+        raise InputError(f"{path}: {option} is needed; topics that could be {what}: {listed}; there are {there}")
+    return fitting[0], (f"{option} {fitting[0].name}: the only one that could be {what}",)
+
+
+def _read_topic(
+    path: Any, reader: Any, topic: Topic, readers: Mapping[str, MessageReader], choice: Choice
+) -> BagStream:
+    """All readings of a topic, kept as flat arrays of numbers; of one frame alone."""
+    place = f"{path}: {topic.name}"
+    names, read = readers[topic.type]
+    stamps, values, frames, unstamped = array("q"), array("d"), set(), 0
+    try:
+        for connection, recorded, raw in reader.messages([c for c in reader.connections if c.topic == topic.name]):
+            for one in read(reader.deserialize(raw, connection.msgtype), choice):
+                frames.add(one.frame)
+                if one.frame == (choice.child_frame or one.frame):
+                    unstamped += not one.stamp
+                    stamps.append(one.stamp if one.stamp and not choice.bag_time else recorded)
+                    values.extend(one.values)
+    except InputError as error:
+        raise InputError(f"{place}: {error}") from None
+    _check_frame(place, frames, choice.child_frame)
+    if 0 < unstamped < len(stamps):
+        raise InputError(
+            f"{place}: {unstamped} of {len(stamps)} messages have no stamp; --bag-time takes all times from the bag"
+        )
+    t = seconds(np.frombuffer(stamps, np.int64))
+    _check_clock(place, t)
+    columns = dict(zip(names, np.frombuffer(values).reshape(-1, len(names)).T.copy(), strict=True))
+    return _as_stream(t, columns, topic, bool(unstamped))
+
+
+def _check_frame(place: str, frames: set[str], wanted: str | None) -> None:
+    """InputError where several frames move and none is chosen, or the chosen one is not there."""
+    listed = ", ".join(sorted(frames))
+    if wanted is None and len(frames) > 1:
+        raise InputError(f"{place}: holds several frames; choose the robot's: --child-frame, one of {listed}")
+    if wanted is not None and wanted not in frames and frames != {""}:
+        raise InputError(f"{place}: no child frame {wanted!r}; there are {listed}")
+    if wanted is not None and frames == {""}:
+        raise InputError(f"{place}: has no child frames; leave --child-frame out")
+
+
+def _check_clock(place: str, t: np.ndarray) -> None:
+    """InputError for a clock that goes back."""
+    back = np.flatnonzero(np.diff(t) < 0.0)
+    if back.size:
+        k = back[0]
+        raise InputError(
+            f"{place}: the clock goes back from {t[k]:.10g} to {t[k + 1]:.10g} s at message {k + 1}: a simulation that "
+            "was reset? Record anew, or cut the bag there; --bag-time takes times from the bag"
+        )
+
+
+def _as_stream(t: np.ndarray, columns: dict[str, np.ndarray], topic: Topic, unstamped: bool) -> BagStream:
+    """The stream with its heading, and what is worth knowing of it."""
+    notes = []
+    if unstamped:
+        notes.append(f"{topic.name} ({topic.type}) has no stamps: its times are those at which the bag recorded it")
+    if "qw" in columns:
+        variance = [columns.pop(f"var_{name}") for name in Pose._fields]
+        columns["theta"] = heading_of(*(columns.pop(name) for name in QUATERNION))
+        known = np.sqrt([np.median(one) if np.isfinite(one).all() and (one >= 0.0).all() else 0.0 for one in variance])
+        if known.any():
+            x, y, theta = known
+            notes.append(
+                f"{topic.name} claims standard deviations of {x:.2g} m, {y:.2g} m, {theta:.2g} rad (median): compare "
+                "them with the noise that `jaxident identify` finds"
+            )
+        if np.isnan(columns["theta"]).all():
+            raise InputError(f"{topic.name}: every orientation is (0, 0, 0, 0), which is no rotation")
+    return BagStream(t, columns, tuple(notes))
