@@ -3,9 +3,7 @@
 import click
 
 from jaxident.cli.progress import working
-from jaxident.cli.session import wrote
-
-above_zero = click.FloatRange(0, min_open=True)
+from jaxident.cli.session import Number, above_zero, check_outputs, wrote
 
 
 @click.command()
@@ -13,7 +11,7 @@ above_zero = click.FloatRange(0, min_open=True)
 @click.option("--poses", required=True, metavar="CSV", help="Columns t,x,y,theta.")
 @click.option("--period", type=above_zero, metavar="S", help="Rows at this even period; without it one row per event.")
 @click.option("--track", type=above_zero, metavar="W", help="Distance between the wheels [m], for commands in v,w.")
-@click.option("--pose-offset", type=float, default=0.0, show_default=True, metavar="S", help="Added to pose times.")
+@click.option("--pose-offset", type=Number(), default=0.0, show_default=True, metavar="S", help="Added to pose times.")
 @click.option("--hold-timeout", type=above_zero, metavar="S", help="A command older than this counts as zero.")
 @click.option("--out", required=True, metavar="LOG", help="The log to write (.csv or .csv.gz).")
 def command(commands, poses, period, track, pose_offset, hold_timeout, out):
@@ -26,6 +24,7 @@ def command(commands, poses, period, track, pose_offset, hold_timeout, out):
     from jaxident.files.logs import write_log
     from jaxident.files.streams import merge, read_commands, read_poses
 
+    check_outputs(out)
     settings = {"period": period, "track": track, "pose_offset": pose_offset, "hold_timeout": hold_timeout}
     with working("converting"):
         log = merge(read_commands(commands), read_poses(poses), **settings)
