@@ -26,7 +26,7 @@ class SeveralPerOption(click.Command):
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Repeat the option before each of its words."""
         spread, taking = [], False
-        for word, after in zip(args, [*args[1:], "--"], strict=True):
+        for word, after in zip(args, [*args[1:], "--"][: len(args)], strict=True):
             if word == "--sim":
                 taking = True
                 if after.startswith("--"):
