@@ -96,10 +96,7 @@ def command(logs, method, noise_law, coupling, d_max, reading, count, resample, 
     settings = {"noise_law": noise_law, "coupling": coupling, "d_max": d_max, **paper}
     with working("identifying"):
         found = identify(records, method, reading=reading and reading.replace("-", "_"), **settings)
-    for line in found.suspicions:
-        click.echo(f"warning: {line}", err=True)
-    if not bool(found.ok):
-        raise WorkError(f"the fit did not converge, and nothing is written: {_failure(found)}")
+    _warn(found)
     again = count and _resample(found, records, count, resample, seed, d_max)
     origin = found.model.provenance._replace(version=jaxident.__version__, method=method, logs=tuple(logs))
     origin = with_session(origin, join(records))
@@ -117,6 +114,14 @@ def command(logs, method, noise_law, coupling, d_max, reading, count, resample, 
     parameters = [row._asdict() for row in rows]
     result = {"model": model_to_dict(model), "parameters": parameters, "suspicions": found.suspicions}
     write_json(result | ({"bootstrap": _as_dict(again)} if again else {}), json_file)
+
+
+def _warn(found) -> None:
+    """Print what speaks against an identification; WorkError where it did not converge."""
+    for line in found.suspicions:
+        click.echo(f"warning: {line}", err=True)
+    if not bool(found.ok):
+        raise WorkError(f"the fit did not converge, and nothing is written: {_failure(found)}")
 
 
 def _failure(found) -> str:

@@ -19,6 +19,8 @@ PARTS = ("rate", "gain", "coupling", "dead_zone")
 
 SMALLEST_RUN, LONGEST_RUN = 20, 10_000_000
 """Rows of a run: the longest lasts a day at 100 Hz."""
+LONGEST_NAME = 300
+"""Characters of a name; a picture grows with it."""
 MOST_TRIALS = 100_000_000
 """Trials of a study: some 200 bytes are kept of each and estimator, 20 GB in all."""
 CHUNK = 2000
@@ -101,6 +103,7 @@ class Study(NamedTuple):
 
 def check_study(study: Study, where: str = "study") -> None:
     """InputError naming the key, what is wrong and what would be right; `where` is what the line calls the study."""
+    _check_name(study.name, f"{where}: name")
     _check_axes(study, where)
     for key, most in (("seeds", MOST_TRIALS), ("hold", LONGEST_RUN), ("chunk", MOST_TRIALS)):
         if not 1 <= getattr(study, key) <= most:
@@ -145,11 +148,20 @@ def _check_axes(study: Study, where: str) -> None:
 def _check_axis(values: Sequence[Any], where: str) -> None:
     if not values:
         raise InputError(f"{where}: is empty; it needs at least one entry")
-    if any(isinstance(value, float) and not math.isfinite(value) for value in values):
-        raise InputError(f"{where}: every entry should be a finite number")
+    for value in values:
+        if isinstance(value, float) and not math.isfinite(value):
+            raise InputError(f"{where}: every entry should be a finite number")
+        if isinstance(value, str):
+            _check_name(value, where)
     twice = next((value for value, count in Counter(values).items() if count > 1), None)
     if twice is not None:
         raise InputError(f"{where}: {twice!r} stands there twice; keep one")
+
+
+def _check_name(name: str, where: str) -> None:
+    if not (name.isprintable() and name.strip() and len(name) <= LONGEST_NAME):
+        raise InputError(f"{where}: {name[:40]!r} is no name: it should have 1 to {LONGEST_NAME} letters, no control "
+                         "characters")  # fmt: skip
 
 
 def _check_candidate(candidate: Candidate, where: str, duration: float) -> None:
