@@ -99,8 +99,7 @@ def command(logs, method, noise_law, coupling, d_max, reading, count, resample, 
     _warn(found)
     again = count and _resample(found, records, count, resample, seed, d_max)
     origin = found.model.provenance._replace(version=jaxident.__version__, method=method, logs=tuple(logs))
-    origin = with_session(origin, join(records))
-    model = dataclasses.replace(found.model, provenance=origin)
+    model = dataclasses.replace(found.model, provenance=with_session(origin, join(records)))
     rows = verdicts(model, max(float(abs(u).max()) for record in records for u in record.command))
     _say(found, rows, method, again)
     if out:
