@@ -1,5 +1,6 @@
 """Arithmetic that is finite, differentiable and fast where the textbook form is not."""
 
+import contextlib
 import math
 from collections.abc import Callable
 from typing import Any
@@ -28,6 +29,12 @@ _PI = (3.1415926534682512, 1.2154201012607932e-10, 4.044532497591901e-21)
 _SERIES_BELOW = 0.5
 _SERIES_TERMS = 15
 _FEW_TRIALS = 16
+
+
+def float64_switch(on: bool) -> contextlib.AbstractContextManager[None]:
+    """Double precision on or off for a block of code; older versions of JAX keep the switch among the experiments."""
+    place: Any = jax if hasattr(jax, "enable_x64") else jax.experimental
+    return place.enable_x64(on)
 
 
 def require_float64(caller: str) -> None:

@@ -10,6 +10,7 @@ from jaxident.numerics import (
     GAUSS_NODES,
     GAUSS_WEIGHTS,
     add_pairs,
+    float64_switch,
     hold_integrals,
     in_blocks,
     require_float64,
@@ -142,7 +143,7 @@ def test_safe_norm():
 
 def test_double_precision_is_asked_for_by_name():
     require_float64("fit")
-    with jax.enable_x64(False), pytest.raises(RuntimeError, match=r"fit needs .*start_jax\(\)"):
+    with float64_switch(False), pytest.raises(RuntimeError, match=r"fit needs .*start_jax\(\)"):
         require_float64("fit")
 
 

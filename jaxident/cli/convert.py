@@ -3,25 +3,19 @@
 import click
 
 from jaxident.cli.progress import working
-from jaxident.cli.session import ColumnsOption, columns_option, table, warn, wrote
+from jaxident.cli.session import ColumnsOption, Number, above_zero, check_outputs, columns_option, table, warn, wrote
 
-above_zero = click.FloatRange(0, min_open=True)
 NEEDED = "give --commands CSV --poses CSV, or --bag PATH"
 
 
-class OffsetOption(click.ParamType):
+class OffsetOption(Number):
     """A time in seconds, or `auto`."""
 
     name = "S|auto"
 
     def convert(self, value, param, ctx):
-        """The time, or None for `auto`."""
-        if value == "auto":
-            return value
-        try:
-            return float(value)
-        except ValueError:
-            self.fail(f"{value!r} is neither a time in seconds nor auto", param, ctx)
+        """The time, or the word `auto`."""
+        return value if value == "auto" else super().convert(value, param, ctx)
 
 
 class OrderOption(click.ParamType):
@@ -78,6 +72,7 @@ def command(commands, poses, bag, listing, out, period, track, pose_offset, hold
     from jaxident.files.logs import write_log
     from jaxident.files.streams import merge
 
+    check_outputs(out)
     with working("converting"):
         given, seen, notes = _from_bag(bag, chosen) if bag else _from_files(commands, poses, chosen)
         offset, told = _estimate(given, seen, track) if pose_offset == "auto" else (pose_offset, ())

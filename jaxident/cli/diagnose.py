@@ -6,9 +6,10 @@ import os
 import click
 
 from jaxident.cli.progress import working
-from jaxident.cli.session import columns_option, seed_option, table, warn, write_json, wrote
+from jaxident.cli.session import above_zero, check_outputs, columns_option, seed_option, table, warn, write_json, wrote
 from jaxident.start import start_jax
 
+OUTPUTS = ("diagnosis.json", "nominal_model.json", "corrected_model.json", "report.html")
 SENTENCE = {
     "no_gap": "no gap: the nominal model predicts these runs as well as their noise allows",
     "parameters": "the model's form is right, its parameters are not",
@@ -25,9 +26,11 @@ class SeveralPerOption(click.Command):
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Repeat the option before each of its words."""
         spread, taking = [], False
-        for word in args:
+        for word, after in zip(args, [*args[1:], "--"][: len(args)], strict=True):
             if word == "--sim":
                 taking = True
+                if after.startswith("--"):
+                    raise click.UsageError("--sim: names no log; the logs of your simulator follow it", ctx)
             elif taking and not word.startswith("--"):
                 spread += ["--sim", word]
             else:
@@ -40,7 +43,7 @@ class SeveralPerOption(click.Command):
 @click.argument("logs", nargs=-1, required=True, metavar="LOG...")
 @click.option("--sim", multiple=True, metavar="LOG...", help="Logs of your own simulator, after those of the robot.")
 @click.option("--model", metavar="MODEL", help="A model to judge as it stands, effects included.")
-@click.option("--horizon", type=click.FloatRange(0, min_open=True), metavar="S", help="Seconds ahead (default: 1).")
+@click.option("--horizon", type=above_zero, metavar="S", help="Seconds ahead (default: 1).")
 @click.option("--out", default="diagnosis", show_default=True, metavar="DIR", help="The folder to write.")
 @columns_option
 @seed_option
@@ -67,7 +70,8 @@ def command(logs, columns, sim, model, horizon, out, seed):
     nominal = load_model(model) if model else None
     warn(log_suspicions(join(records)), columns)
     warn(f"the simulator's logs: {line}" for line in (log_suspicions(join(theirs)) if theirs else ()))
-    make_folder(out)  # a folder that cannot be made is told before the work, not after it
+    make_folder(out)  # what cannot be written is told before the work, not after it
+    check_outputs(*(os.path.join(out, name) for name in OUTPUTS))
     with working("diagnosing"):
         found = diagnose(records, sim=theirs or None, model=nominal, horizon=horizon, seed=seed)
     found = _with_origin(found, logs, seed)

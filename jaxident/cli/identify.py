@@ -5,9 +5,23 @@ import dataclasses
 import click
 
 from jaxident.cli.progress import working
-from jaxident.cli.session import columns_option, json_option, seed_option, table, warn, write_json, wrote
+from jaxident.cli.session import (
+    Number,
+    above_zero,
+    check_outputs,
+    columns_option,
+    json_option,
+    seed_option,
+    table,
+    warn,
+    write_json,
+    wrote,
+)
+from jaxident.errors import WorkError
 from jaxident.start import start_jax
 
+MOST_REFITS = 100_000
+"""Refits of a bootstrap; more than some thousands move an interval's ends by nothing."""
 NOTES = {
     "paper": "Intervals take the equation error for white. Camera noise makes it coloured and biases these estimates: "
     "see the README, 'What the paper's method can and cannot do'.",
@@ -35,19 +49,21 @@ NOTES = {
     help="What is random: white camera error, one with a memory, slip of the wheels; auto tries them in turn while the "
     "residuals are coloured.",
 )
-@click.option(
-    "--setup-time", type=click.FloatRange(0, min_open=True), metavar="S", help="Seconds for the start values (paper)."
-)
-@click.option("--forgetting", type=float, metavar="F", help="In (0, 1]; 1, the default, forgets nothing.")
+@click.option("--setup-time", type=above_zero, metavar="S", help="Seconds for the start values (paper).")
+@click.option("--forgetting", type=Number(), metavar="F", help="In (0, 1]; 1, the default, forgets nothing.")
 @click.option("--coupling", is_flag=True, help="Let the two speeds drive each other: two more parameters.")
-@click.option("--d-max", type=float, metavar="D", help="Largest dead zone (default: 0.9 of the largest command).")
+@click.option("--d-max", type=Number(), metavar="D", help="Largest dead zone (default: 0.9 of the largest command).")
 @click.option(
     "--reading",
     type=click.Choice(["free-run", "one-step"]),
     help="How the cost of the start values reads the paper's (21); one-step by default (paper).",
 )
 @click.option(
-    "--bootstrap", "count", type=int, metavar="N", help="Also intervals from N refits to resampled residuals; 200 do."
+    "--bootstrap",
+    "count",
+    type=click.IntRange(1, MOST_REFITS),
+    metavar="N",
+    help="Also intervals from N refits to resampled residuals; 200 do.",
 )
 @click.option(
     "--resample",
@@ -61,9 +77,7 @@ NOTES = {
 @click.option("--out", metavar="MODEL", help="The model file to write.")
 @click.option("--report", metavar="FILE", help="A page (.html): intervals, verdicts, doubts, residuals, pictures.")
 @json_option
-def command(
-    logs, columns, method, noise_law, coupling, d_max, reading, count, resample, seed, out, report, json_file, **paper
-):
+def command(logs, columns, method, reading, count, resample, seed, out, report, json_file, **settings):
     """The model behind one or several logs (files, folders, or `-`), runs in the order given.
 
     Example: jaxident identify log.csv --out model.json
@@ -80,16 +94,16 @@ def command(
     for option in [name for name, value in (("--report", report), ("--bootstrap", count)) if value is not None]:
         if method != "maximum-likelihood":
             raise click.UsageError(f"{option} needs the method maximum-likelihood")
+    check_outputs(out, report, json_file)
     records = read_logs(logs, columns)
-    settings = {"noise_law": noise_law, "coupling": coupling, "d_max": d_max, **paper}
     with working("identifying"):
         found = identify(records, method, reading=reading and reading.replace("-", "_"), **settings)
-    again = count and _resample(found, records, count, resample, seed, d_max)
+    _warn(found, columns)
+    again = count and _resample(found, records, count, resample, seed, settings["d_max"])
     origin = found.model.provenance._replace(version=jaxident.__version__, method=method, logs=tuple(logs))
-    origin = with_session(origin, join(records))
-    model = dataclasses.replace(found.model, provenance=origin)
+    model = dataclasses.replace(found.model, provenance=with_session(origin, join(records)))
     rows = verdicts(model, max(float(abs(u).max()) for record in records for u in record.command))
-    _say(found, rows, method, again, columns)
+    _say(found, rows, method, again)
     if out:
         save_model(model, out)
         wrote(out)
@@ -100,6 +114,29 @@ def command(
             wrote(path)
     result = {"parameters": [row._asdict() for row in rows], "suspicions": found.suspicions}
     write_json({"model": model_to_dict(model)} | result | ({"bootstrap": _as_dict(again)} if again else {}), json_file)
+
+
+def _warn(found, columns) -> None:
+    """Print what speaks against an identification; WorkError where it did not converge."""
+    warn(found.suspicions, columns)
+    if not bool(found.ok):
+        raise WorkError(f"the fit did not converge, and nothing is written: {_failure(found)}")
+
+
+def _failure(found) -> str:
+    """Why a fit did not converge, and what to try."""
+    import numpy as np
+
+    if found.fit is None:
+        return "the log has no more usable samples than the model has unknowns; record longer runs"
+    measured = int(np.isfinite(np.asarray(found.residuals.x)).sum())
+    unknowns = len(found.model.parameter_order) + np.size(found.fit.starts)
+    if 3 * measured <= unknowns:
+        return f"{measured} poses do not determine {unknowns} unknowns; record longer runs"
+    return (
+        f"its search stopped after {int(found.fit.steps)} steps without a minimum; look at the log, or try another "
+        "--noise-law: white is the simplest"
+    )
 
 
 def _resample(found, records, count, resample, seed, d_max):
@@ -121,8 +158,8 @@ def _as_dict(again) -> dict:
     }  # fmt: skip
 
 
-def _say(found, rows, method: str, again, columns) -> None:
-    """Print the parameters, what their intervals mean, and every warning."""
+def _say(found, rows, method: str, again) -> None:
+    """Print the parameters and what their intervals mean."""
     from jaxident.estimation.bootstrap import describe, interval_cells
 
     lines = [("parameter", "estimate", "95 % interval", "this input"), *(row.cells() for row in rows)]
@@ -133,9 +170,3 @@ def _say(found, rows, method: str, again, columns) -> None:
     click.echo(NOTES[method])
     if again:
         click.echo(describe(again))
-    warn(found.suspicions, columns)
-    if not bool(found.ok):
-        click.echo(
-            "warning: the fit did not converge: do not trust these numbers before you have looked at the log",
-            err=True,
-        )

@@ -2,6 +2,7 @@
 
 import contextlib
 import importlib
+import io
 import os
 import sys
 import warnings
@@ -24,6 +25,10 @@ COMMANDS = {
     "sweep": "A Monte-Carlo study: statistics over seeds, excitations, noise levels, robots, estimators.",
     "bench": "How fast the pipeline is on this machine.",
 }
+
+
+LONGEST_LINE = 1200
+"""Characters of a message: the catalogue's names, which some of them list, take 700."""
 
 
 class LazyGroup(click.Group):
@@ -58,7 +63,10 @@ def run() -> None:
     """Entry point of `jaxident` and `python -m jaxident`: exit 0 done, 2 wrong use or bad input, 1 the work failed."""
     # two threads make NumPy's small matrices five times slower on a busy machine; read once, when NumPy is loaded
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    warnings.showwarning = lambda message, *_, **__: print(f"warning: {message}", file=sys.stderr)
+    warnings.showwarning = lambda message, *_, **__: print(f"warning: {one_line(str(message))}", file=sys.stderr)
+    for stream in (sys.stdout, sys.stderr):  # a file's name may be no text: what cannot be printed is written out
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     try:
         with contextlib.redirect_stdout(Lasting(sys.stdout)):
             code = program.main(prog_name="jaxident", standalone_mode=False)
@@ -84,7 +92,7 @@ def _explain(error: BaseException) -> int:
         return _say(str(error.format_message() if isinstance(error, click.ClickException) else error), 2)
     if isinstance(error, WorkError):
         return _say(str(error), 1)
-    if isinstance(error, MemoryError):
+    if isinstance(error, MemoryError) or "RESOURCE_EXHAUSTED" in str(error):  # the latter is the compiler's word
         return _say("out of memory", 1)
     return _say(f"{type(error).__name__}: {error} (JAXIDENT_TRACEBACK=1 shows where)", 1)
 
@@ -94,5 +102,11 @@ def _where(error: click.UsageError) -> str:
 
 
 def _say(line: str, code: int) -> int:
-    print(f"jaxident: {' '.join(line.split())}", file=sys.stderr)
+    print(f"jaxident: {one_line(line)}", file=sys.stderr)
     return code
+
+
+def one_line(text: str) -> str:
+    """A text on one line, without its middle where it is long; what a terminal would obey is written out instead."""
+    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in " ".join(text.split()))
+    return line if len(line) <= LONGEST_LINE else f"{line[: LONGEST_LINE // 2]} ... {line[-LONGEST_LINE // 2 :]}"

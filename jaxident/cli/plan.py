@@ -3,7 +3,16 @@
 import click
 
 from jaxident.cli.progress import working
-from jaxident.cli.session import json_option, seed_option, table, write_json, wrote
+from jaxident.cli.session import (
+    MOST_ROWS,
+    above_zero,
+    check_outputs,
+    json_option,
+    seed_option,
+    table,
+    write_json,
+    wrote,
+)
 from jaxident.start import start_jax
 
 PLAIN = 9.0
@@ -13,8 +22,10 @@ PLAIN = 9.0
 @click.command()
 @click.argument("model")
 @click.option("--between", required=True, metavar="A,B", help="Two effects (`jaxident effects` lists them).")
-@click.option("--samples", type=click.IntRange(2), default=600, show_default=True, help="Length of the run, in rows.")
-@click.option("--limit", type=click.FloatRange(0, min_open=True), default=1.0, show_default=True, metavar="UMAX",
+@click.option(
+    "--samples", type=click.IntRange(2, MOST_ROWS), default=600, show_default=True, help="Length of the run, in rows."
+)
+@click.option("--limit", type=above_zero, default=1.0, show_default=True, metavar="UMAX",
               help="Largest command, in the unit of the model.")  # fmt: skip
 @click.option("--out", required=True, metavar="LOG", help="The log to write: times and commands, no poses.")
 @seed_option
@@ -32,6 +43,7 @@ def command(model, between, samples, limit, out, seed, json_file):
     from jaxident.files.logs import write_log
     from jaxident.files.models import load_model
 
+    check_outputs(out, json_file)
     names = tuple(name.strip() for name in between.split(","))
     robot = load_model(model)
     with working("trying inputs"):

@@ -3,7 +3,7 @@
 import click
 
 from jaxident.cli.progress import working
-from jaxident.cli.session import columns_option, json_option, write_json, wrote
+from jaxident.cli.session import Number, check_outputs, columns_option, json_option, rows_option, write_json, wrote
 from jaxident.errors import WorkError
 from jaxident.start import start_jax
 
@@ -11,13 +11,13 @@ from jaxident.start import start_jax
 @click.command()
 @click.argument("model")
 @click.argument("log")
-@click.option("--horizon", type=click.IntRange(1), required=True, metavar="N", help="Rows of each free run.")
-@click.option("--burn-in", type=click.IntRange(1), default=20, show_default=True, metavar="M", help="Rows before it.")
-@click.option("--stride", type=click.IntRange(1), metavar="S", help="Rows between starts (default: the horizon).")
-@click.option("--from", "first", type=float, metavar="T", help="Use the rows from this time [s] on.")
-@click.option("--to", "last", type=float, metavar="T", help="Use the rows up to this time [s].")
-@click.option("--session-time", type=float, metavar="S", help="Session time [s] at the first row of LOG, for effects "
-              "that drift (default: as the model's provenance says).")  # fmt: skip
+@click.option("--horizon", type=rows_option, required=True, metavar="N", help="Rows of each free run.")
+@click.option("--burn-in", type=rows_option, default=20, show_default=True, metavar="M", help="Rows before it.")
+@click.option("--stride", type=rows_option, metavar="S", help="Rows between starts (default: the horizon).")
+@click.option("--from", "first", type=Number(), metavar="T", help="Use the rows from this time [s] on.")
+@click.option("--to", "last", type=Number(), metavar="T", help="Use the rows up to this time [s].")
+@click.option("--session-time", type=Number(), metavar="S", help="Session time [s] at the first row of LOG, for "
+              "effects that drift (default: as the model's provenance says).")  # fmt: skip
 @click.option("--out", required=True, metavar="CSV", help="The predictions to write (.csv or .csv.gz).")
 @columns_option
 @json_option
@@ -34,6 +34,7 @@ def command(model, log, horizon, burn_in, stride, first, last, session_time, out
     from jaxident.files.predictions import write_prediction
     from jaxident.log import between
 
+    check_outputs(out, json_file)
     robot, whole = load_model(model), read_whole(log, columns)
     record = between(whole, first, last)
     begin, known = time_in_session(robot, whole, record)

@@ -1,14 +1,33 @@
 """What the commands share: options, JSON results, tables."""
 
 import json
+import math
 import os
 import re
 from typing import Any
 
 import click
 
-from jaxident.files.atomic import write_text
+from jaxident.files.atomic import check_target, write_text
 
+MOST_ROWS = 10_000_000
+"""Rows, samples or levels that an option may ask for: a day at 100 Hz."""
+MOST_SEEDS = 2**63
+
+
+class Number(click.FloatRange):
+    """A finite number, in a range where one is given."""
+
+    def convert(self, value, param, ctx):
+        """The number; what is infinite or no number is refused."""
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value!r} is not a finite number", param, ctx)
+        return number
+
+
+above_zero = Number(0, min_open=True)
+rows_option = click.IntRange(1, MOST_ROWS)
 json_option = click.option("--json", "json_file", metavar="FILE", help="Also write the result here, for programs.")
 
 
@@ -40,7 +59,13 @@ def _source(name: str, columns) -> str:
     return columns[name].source if columns and name in columns else name
 
 
-seed_option = click.option("--seed", default=0, show_default=True, help="Makes every random result repeatable.")
+seed_option = click.option(
+    "--seed",
+    type=click.IntRange(0, MOST_SEEDS - 1),
+    default=0,
+    show_default=True,
+    help="Makes every random result repeatable.",
+)
 
 
 class EffectOption(click.ParamType):
@@ -56,6 +81,7 @@ class EffectOption(click.ParamType):
             key, equals, number = part.partition("=")
             try:
                 parameters[key.strip()] = float(number)
+                equals = equals if math.isfinite(float(number)) else ""
             except ValueError:
                 equals = ""
             if not equals:
@@ -66,6 +92,13 @@ class EffectOption(click.ParamType):
 
 
 effect_option = click.option("--effect", "effects", type=EffectOption(), multiple=True, help="Repeatable.")
+
+
+def check_outputs(*paths: str | None) -> None:
+    """InputError unless each of these files can be written: told before the work, not after it. None is no file."""
+    for path in paths:
+        if path is not None:
+            check_target(path)
 
 
 def write_json(content: Any, path: str | None) -> None:

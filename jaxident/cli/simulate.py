@@ -3,7 +3,7 @@
 import click
 
 from jaxident.cli.progress import working
-from jaxident.cli.session import effect_option, seed_option, wrote
+from jaxident.cli.session import MOST_ROWS, above_zero, check_outputs, effect_option, rows_option, seed_option, wrote
 from jaxident.start import start_jax
 
 EXCITATION_NAMES = ("staircase", "multilevel", "prbs", "multisine", "chirp")
@@ -29,9 +29,9 @@ class Noise(click.ParamType):
 @click.argument("model")
 @click.option("--inputs", metavar="LOG", help="Take times and commands from this log (`-`: standard input).")
 @click.option("--excitation", type=click.Choice(EXCITATION_NAMES), help="Make the commands instead.")
-@click.option("--samples", type=click.IntRange(2), help="Length of the excitation, in rows.")
-@click.option("--amplitude", type=click.FloatRange(0, min_open=True), default=1.0, show_default=True)
-@click.option("--hold", type=click.IntRange(1), default=20, show_default=True, help="Samples that a level lasts.")
+@click.option("--samples", type=click.IntRange(2, MOST_ROWS), help="Length of the excitation, in rows.")
+@click.option("--amplitude", type=above_zero, default=1.0, show_default=True)
+@click.option("--hold", type=rows_option, default=20, show_default=True, help="Samples that a level lasts.")
 @effect_option
 @click.option("--noise", type=Noise(), help="Camera noise in metres and radians; without it the log is noise-free.")
 @click.option("--out", required=True, metavar="LOG", help="The log to write (.csv or .csv.gz).")
@@ -57,6 +57,7 @@ def command(model, inputs, excitation, samples, amplitude, hold, effects, noise,
     from jaxident.files.models import load_model
     from jaxident.study.synthetic import excite, simulate_runs
 
+    check_outputs(out)
     robot = with_effects(load_model(model), effects)
     key_input, key_noise = jax.random.split(jax.random.key(seed))
     with working("simulating"):

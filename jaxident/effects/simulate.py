@@ -1,5 +1,7 @@
 """`ji.simulate`: the nominal program for a model without effects, the full one for a model with."""
 
+from functools import partial
+
 import jax
 import numpy as np
 
@@ -44,7 +46,7 @@ def is_random(model: Model) -> bool:
     return any(CATALOGUE[effect.name].random for effect in model.effects)
 
 
-@jax.jit(static_argnames=("substeps", "parts"))
+@partial(jax.jit, static_argnames=("substeps", "parts"))
 def _poses(drive, dead_zone, vector, log: Log, start, noise, key, session_time, laws, *, substeps: int, parts) -> Pose:
     command = log.command
     return run_full(drive, dead_zone, vector, log.t, command, start, noise=noise, key=key, session_time=session_time,

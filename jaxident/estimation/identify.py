@@ -1,5 +1,6 @@
 """One identification from start to end: logs in, model out."""
 
+import dataclasses
 from collections.abc import Sequence
 from functools import partial
 from typing import Any, NamedTuple
@@ -19,6 +20,7 @@ from jaxident.estimation.least_squares import full_covariance
 from jaxident.estimation.maximum_likelihood import Fit
 from jaxident.estimation.observations import observe_log
 from jaxident.estimation.suspicions import log_suspicions
+from jaxident.estimation.verdict import at_bound, bound_doubts
 from jaxident.log import Log, even_period, join
 from jaxident.numerics import require_float64
 from jaxident.robot.difference import Difference
@@ -91,13 +93,21 @@ def identify(
     check_settings(1.0 if forgetting is None else forgetting, d_max, largest)
     if method == "paper":
         settings = setup_time, 1.0 if forgetting is None else forgetting, reading or "one_step"
-        return _identify_as_paper(log, d_max, *settings)._replace(suspicions=log_suspicions(log))
+        paper = _identify_as_paper(log, d_max, *settings)
+        return _with_bounds(paper._replace(suspicions=log_suspicions(log)), d_max)
     if method in YARDSTICKS:
-        return _identify_by_yardstick(log, method, d_max)._replace(suspicions=log_suspicions(log))
+        return _with_bounds(_identify_by_yardstick(log, method, d_max)._replace(suspicions=log_suspicions(log)), d_max)
     found = identify_poses(log, d_max, noise_law, coupling)
-    return Identification(
-        found.model, found.model.covariance, found.residuals, found.fit.ok, fit=found.fit, suspicions=found.suspicions
-    )
+    every = found.model, found.model.covariance, found.residuals, found.fit.ok
+    return _with_bounds(Identification(*every, fit=found.fit, suspicions=found.suspicions), d_max)
+
+
+def _with_bounds(found: Identification, d_max: float) -> Identification:
+    """The identification, its model and its suspicions telling what stands at a bound of its search."""
+    bounds = at_bound(found.model, d_max)
+    origin = found.model.provenance._replace(at_bound=tuple(bounds))
+    model = dataclasses.replace(found.model, provenance=origin)
+    return found._replace(model=model, suspicions=found.suspicions + bound_doubts(bounds))
 
 
 def _check_method(method: str, coupling: bool, of_the_paper: dict[str, Any]) -> None:

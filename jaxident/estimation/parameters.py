@@ -32,10 +32,11 @@ NAMES = (
 """All unknowns in the order of the vector; a law keeps some of them."""
 
 _LOGARITHMIC = ("rate_1", "rate_2", *NAMES[10:])
-_LOWEST = {"rate": 1e-4, "position": 1e-9, "heading": 1e-9, "correlation_time": 1e-4, "slip_along": 1e-7,
+LOWEST = {"rate": 1e-4, "position": 1e-9, "heading": 1e-9, "correlation_time": 1e-4, "slip_along": 1e-7,
            "slip_heading": 1e-7}  # fmt: skip
-_HIGHEST = {"rate": 1e3, "position": 1e3, "heading": 1e2, "correlation_time": 1e3, "slip_along": 1e3,
+HIGHEST = {"rate": 1e3, "position": 1e3, "heading": 1e2, "correlation_time": 1e3, "slip_along": 1e3,
             "slip_heading": 1e3}  # fmt: skip
+"""Between what a search may visit, by name or what is before its number: 1/s, m, rad, s, m/s^0.5, rad/s^0.5."""
 
 
 def names(law: Law) -> tuple[str, ...]:
@@ -100,4 +101,4 @@ def bounds(law: Law, d_max: Array) -> tuple[Array, Array]:
 
         return jnp.stack([limit(name) for name in names(law)])
 
-    return limits(_LOWEST, -jnp.inf, 0.0), limits(_HIGHEST, jnp.inf, d_max)
+    return limits(LOWEST, -jnp.inf, 0.0), limits(HIGHEST, jnp.inf, d_max)

@@ -109,13 +109,19 @@ def prediction_error(prediction: Prediction, log: Log) -> dict[str, Any]:
     seen = np.isfinite(measured).all(axis=1) & finite
     dx, dy, turn = (measured - modelled)[seen].T
     position, heading = np.hypot(dx, dy), np.abs((turn + np.pi) % (2.0 * np.pi) - np.pi)
-    own = np.sqrt(np.mean(deviation[seen] ** 2, axis=0)) if seen.any() else np.full(3, np.nan)
+    own = [root_mean_square(column) for column in deviation[seen].T] if seen.any() else [np.nan] * 3
     summary: dict[str, Any] = {
         "starts": len(last), "compared": int(seen.sum()), "failed": int(np.sum(~finite)),
         "run_up": int(np.sum(prediction.run_up[last])), "seconds": float(np.median(seconds)),
     }  # fmt: skip
     for name, error, told in (("position", position, np.hypot(own[0], own[1])), ("heading", heading, own[2])):
         summary[f"{name}_median"] = float(np.median(error)) if seen.any() else None
-        summary[f"{name}_rms"] = float(np.sqrt(np.mean(error**2))) if seen.any() else None
+        summary[f"{name}_rms"] = root_mean_square(error) if seen.any() else None
         summary[f"{name}_expected"] = float(told) if seen.any() else None
     return summary
+
+
+def root_mean_square(values: np.ndarray) -> float:
+    """Of numbers (n,) of any size: the square of a pose that ran away is beyond double precision, its root is not."""
+    largest = float(np.max(np.abs(values)))
+    return largest * float(np.sqrt(np.mean((values / largest) ** 2))) if largest > 0.0 else 0.0

@@ -6,12 +6,15 @@ from typing import NamedTuple
 import jax
 import numpy as np
 
-from jaxident.robot.model import Model, difference_vector
+from jaxident.estimation.parameters import HIGHEST, LOWEST
+from jaxident.robot.model import Model, Provenance, difference_vector
 
 DETERMINED = 0.1
 WEAK = 0.5
 TOGETHER = 0.95
 """Correlation from which a loose parameter is said to move with another."""
+NEAR_BOUND = 1e-9
+"""Share of a bound within which a value stands at it; searches are cut off there, to within rounding."""
 BORROWED, WHY = "from the prior", "this log hardly tells it; number and interval are those of robots in general"
 NOISE_NAMES = ("position", "heading", "correlation_time", "slip_along", "slip_heading")
 
@@ -43,8 +46,44 @@ def verdicts(model: Model, largest_command: float) -> list[Verdict]:
     order = model.parameter_order
     covariance = np.asarray(model.covariance)
     found = verdicts_of(order, np.array([values[name] for name in order]), covariance, largest_command)
-    borrowed = model.provenance.from_prior
-    return [row._replace(verdict=BORROWED, reason=WHY) if row.parameter in borrowed else row for row in found]
+    return [_with_origin(row, model.provenance) for row in found]
+
+
+def _with_origin(row: Verdict, origin: Provenance) -> Verdict:
+    """A verdict in the light of how its number came about: at a bound of its search, or from the prior."""
+    if row.parameter in origin.at_bound:
+        if row.parameter.startswith("dead_zone") and row.estimate <= 0.0:
+            return row._replace(verdict="weak", reason="it stands at 0, the least a dead zone can be")
+        return row._replace(verdict="not determined", reason="it stands at a bound of its search")
+    return row._replace(verdict=BORROWED, reason=WHY) if row.parameter in origin.from_prior else row
+
+
+def at_bound(model: Model, d_max: float) -> dict[str, float]:
+    """The numbers of an estimate that stand at a bound of their search, and that bound; d_max is that of dead zones."""
+    values, found = _values(model), {}
+    for name in model.parameter_order:
+        kind = name.removesuffix("_1").removesuffix("_2")
+        low, high = LOWEST.get(kind, -np.inf), HIGHEST.get(kind, np.inf)
+        if name.startswith("dead_zone"):
+            low, high = 0.0, d_max
+        if values[name] <= low + NEAR_BOUND * (d_max if low == 0.0 else abs(low)):
+            found[name] = low
+        elif values[name] >= high * (1.0 - NEAR_BOUND):
+            found[name] = high
+    return found
+
+
+def bound_doubts(bounds: dict[str, float]) -> tuple[str, ...]:
+    """A line for each number at a bound (`at_bound`) that another bound would change. A dead zone of 0 and no noise
+    stand at bounds of nature."""
+    none = {name: LOWEST[name] for name in ("position", "heading", "slip_along", "slip_heading")}
+    none |= dict.fromkeys(("dead_zone_r", "dead_zone_l"), 0.0)
+    return tuple(
+        f"{name} stands at {bound:g}, the bound of its search: with another bound it would be another number, and its "
+        "interval says nothing"
+        for name, bound in bounds.items()
+        if none.get(name) != bound
+    )
 
 
 def verdicts_of(

@@ -1,16 +1,20 @@
 """Files that appear whole or not at all.
 
 The content goes to a hidden file in the same folder, is forced to the disk and then takes the target's name in one
-step. A pipe or a device (/dev/stdout) has no such step and is written as it stands.
+step. A pipe or a device (/dev/stdout) has no such step and is written as it stands. Who writes holds a lock on the
+hidden file, which the system takes back from a process that dies: the next call in that folder removes what is left.
 """
 
 import codecs
 import contextlib
 import errno
+import fcntl
 import gzip
 import os
 import pathlib
+import re
 import secrets
+import time
 from collections.abc import Iterator
 from typing import BinaryIO
 
@@ -19,6 +23,9 @@ from jaxident.errors import InputError, WorkError
 Target = str | os.PathLike[str]
 
 GZIP_LEVEL = 6
+FRESH = 2.0
+"""Seconds in which a hidden file is nobody's left-over: it may be about to be locked."""
+_PART = re.compile(r"\.[0-9a-f]{16}\.part")
 _FAILED_WORK = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
 
 
@@ -57,9 +64,10 @@ def write_bytes(path: Target, content: bytes) -> None:
 
 @contextlib.contextmanager
 def writing_text(path: Target) -> Iterator[codecs.StreamWriter]:
-    """As `writing_bytes`, for text in UTF-8; line feeds stay as they are."""
+    """As `writing_bytes`, for text in UTF-8; line feeds stay as they are. Half characters, as names of files may hold,
+    are written as a backslash and their number."""
     with writing_bytes(path) as stream:
-        yield codecs.getwriter("utf-8")(stream)
+        yield codecs.getwriter("utf-8")(stream, "backslashreplace")
 
 
 @contextlib.contextmanager
@@ -83,15 +91,36 @@ def writing_bytes(path: Target) -> Iterator[BinaryIO]:
 def _renamed(target: pathlib.Path) -> Iterator[BinaryIO]:
     """A hidden file beside the target, which takes its name in the end."""
     target = pathlib.Path(os.path.realpath(target))  # a link stays, and leads to the new content
+    _remove_left(target.parent)
     hidden = target.with_name(f".{secrets.token_hex(8)}.part")
     try:
         with open(hidden, "xb") as raw:
+            _lock(raw)
             yield raw
             raw.flush()
             os.fsync(raw.fileno())
-        os.replace(hidden, target)
+            os.replace(hidden, target)
     finally:
         hidden.unlink(missing_ok=True)
+
+
+def _remove_left(folder: pathlib.Path) -> None:
+    """Remove the hidden files of processes that died while they wrote here."""
+    for left in folder.glob(".*.part"):
+        if not (_PART.fullmatch(left.name) and left.is_file() and not left.is_symlink()):
+            continue
+        with contextlib.suppress(OSError), open(left, "rb") as raw:
+            if _lock(raw) and time.time() - os.fstat(raw.fileno()).st_mtime > FRESH:
+                left.unlink()
+
+
+def _lock(raw: BinaryIO) -> bool:
+    """Take the lock of an open file; False where another process holds it, or the file system knows no locks."""
+    try:
+        fcntl.flock(raw, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        return False
+    return True
 
 
 @contextlib.contextmanager

@@ -1,6 +1,7 @@
 """Sets of effects as a study file gives them: by name, in typical sizes, by parameters."""
 
 import itertools
+import math
 from typing import Any, NamedTuple
 
 from jaxident.effects.apply import sized
@@ -12,6 +13,9 @@ from jaxident.study.design import EffectSet
 
 NONE = "none"
 """Name of the empty set."""
+
+MOST_SETS = 10_000
+"""Sets that one entry may make."""
 
 
 class Sized(NamedTuple):
@@ -33,12 +37,14 @@ def take_axis(value: Any, where: str) -> tuple[EffectSet, ...]:
 def take_sets(value: Any, where: str) -> list[tuple[Sized, ...]]:
     """The sets of one entry {effect: size, ...}. A size is a strength above 0, in typical sizes, or an object of
     parameters; a list of sizes makes a set of each (every combination where there are several lists)."""
-    choices = []
+    choices: list[list[Sized]] = []
     for name, sizes in take_object(value, where).items():
         check_name(name, where)
         each = sizes if isinstance(sizes, list) else [sizes]
         if not each:
             raise InputError(f"{where}: {name}: is empty; it needs at least one size")
+        if len(each) * math.prod(map(len, choices)) > MOST_SETS:
+            raise InputError(f"{where}: makes more than {MOST_SETS} sets; give fewer sizes")
         choices.append([_sized(name, size, f"{where}: {name}") for size in each])
     return list(itertools.product(*choices))
 

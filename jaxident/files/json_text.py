@@ -5,7 +5,7 @@ import os
 from typing import Any
 
 from jaxident.errors import InputError
-from jaxident.files.source import Source, explained
+from jaxident.files.source import Source, read_text
 
 LINE_LENGTH = 120
 
@@ -16,20 +16,18 @@ def read_json(path: Source) -> Any:
     Stricter than Python's own reader: a key given twice is refused, and so are NaN and Infinity, which JSON lacks.
     Numbers become int or float.
     """
-    name = os.fspath(path)
-    with explained(name, "JSON"), open(path, encoding="utf-8-sig") as stream:
-        text = stream.read()
-    return parse_json(text, name)
+    return parse_json(read_text(path, "JSON"), os.fspath(path))
 
 
 def parse_json(text: str, name: str) -> Any:
     """The content of a JSON text; `name` is what error lines call it."""
 
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        content = dict(pairs)
-        if len(content) < len(pairs):
-            keys = [key for key, _ in pairs]
-            raise InputError(f"{name}: key {next(k for k in keys if keys.count(k) > 1)!r} is given twice; keep one")
+        content: dict[str, Any] = {}
+        for key, value in pairs:
+            if key in content:
+                raise InputError(f"{name}: key {key!r} is given twice; keep one")
+            content[key] = value
         return content
 
     def refuse(word: str) -> None:

@@ -205,7 +205,7 @@ def write_covariance(matrix: Any, order: tuple[str, ...]) -> dict[str, Any]:
 
 def read_provenance(value: Any, where: str) -> Provenance:
     """Version and method, the logs, the seed or None, the session (its duration and the runs that are known), and which
-    parameters come from the prior."""
+    parameters come from the prior or stand at a bound."""
     found = take_keys(value, where, (), Provenance._fields)
     version, method = (take_text(found[key] or "", f"{where}.{key}") for key in ("version", "method"))
     logs = take_list(found["logs"] or [], f"{where}.logs")
@@ -217,9 +217,13 @@ def read_provenance(value: Any, where: str) -> Provenance:
     runs = [
         _read_run(run, f"{where}.runs[{k}]") for k, run in enumerate(take_list(found["runs"] or [], f"{where}.runs"))
     ]
-    loose = take_list(found["from_prior"] or [], f"{where}.from_prior")
-    borrowed = tuple(take_text(one, f"{where}.from_prior[{k}]") for k, one in enumerate(loose))
-    return Provenance(version, method, names, seed, duration, tuple(runs), borrowed)
+    borrowed, bounded = (_read_names(found[key], f"{where}.{key}") for key in ("from_prior", "at_bound"))
+    return Provenance(version, method, names, seed, duration, tuple(runs), borrowed, bounded)
+
+
+def _read_names(value: Any, where: str) -> tuple[str, ...]:
+    """A list of names; none where nothing is given."""
+    return tuple(take_text(name, f"{where}[{k}]") for k, name in enumerate(take_list(value or [], where)))
 
 
 def _read_run(value: Any, where: str) -> tuple[str, float]:
@@ -235,7 +239,8 @@ def write_provenance(origin: Provenance) -> dict[str, Any]:
     content["runs"] = [{"mark": own, "session_time": time} for own, time in origin.runs]
     if not origin.runs:
         del content["runs"], content["duration"]
-    content["from_prior"] = list(origin.from_prior)
-    if not origin.from_prior:
-        del content["from_prior"]
+    for key in ("from_prior", "at_bound"):
+        content[key] = list(content[key])
+        if not content[key]:
+            del content[key]
     return content

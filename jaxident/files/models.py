@@ -5,7 +5,6 @@ period, are checked against it on loading and never used. Numbers come back as N
 so that loading needs no switch of JAX.
 """
 
-import contextlib
 import importlib.resources
 import os
 from collections.abc import Collection
@@ -40,6 +39,7 @@ from jaxident.files.model_sections import (
 )
 from jaxident.files.schema import take_array, take_keys, take_number
 from jaxident.files.source import Source
+from jaxident.numerics import float64_switch
 from jaxident.robot.difference import Difference, to_difference
 from jaxident.robot.drive import Physical
 from jaxident.robot.model import Model, Provenance
@@ -148,11 +148,5 @@ def _check_image(given: Difference, physical: Physical, period: float, name: str
 def _image(physical: Physical, period: Any) -> Difference:
     """`to_difference` in double precision, whatever JAX is set to; compiled, for that is quicker even once."""
     exact = Physical(*(or_none(np.asarray, value, np.float64) for value in physical))
-    with _double_precision():
+    with float64_switch(True):
         return Difference(*(np.asarray(value) for value in _compiled_image(exact, jnp.asarray(period, float))))
-
-
-def _double_precision() -> contextlib.AbstractContextManager[None]:
-    """The switch for a block of code, which older versions of JAX keep among the experiments."""
-    place: Any = jax if hasattr(jax, "enable_x64") else jax.experimental
-    return place.enable_x64(True)

@@ -10,6 +10,20 @@ from jaxident.errors import InputError
 
 Source = str | os.PathLike[str]
 
+LARGEST_TEXT = 1 << 24
+"""Bytes of a model or study file; real ones have some thousands. A file without an end (/dev/zero) ends here."""
+
+
+def read_text(path: Source, kind: str, largest: int = LARGEST_TEXT) -> str:
+    """The whole of a file in UTF-8, with or without byte-order mark; `kind` is what it should be. InputError where it
+    cannot be read or has more than `largest` bytes."""
+    name = os.fspath(path)
+    with explained(name, kind), open(path, "rb") as stream:
+        content = stream.read(largest + 1)
+        if len(content) > largest:
+            raise InputError(f"{name}: has more than {largest} bytes; a {kind} file of this program is far smaller")
+        return content.decode("utf-8-sig")
+
 
 @contextlib.contextmanager
 def explained(name: str, kind: str) -> Iterator[None]:

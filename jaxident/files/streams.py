@@ -17,6 +17,8 @@ ROUNDING = 1e-3
 """Rounding of time stamps, in periods: a command that comes this much after a row is still the row's own."""
 SAME_TIME = 1e-6
 """Times less than this [s] apart are one: adding an offset to decimal stamps moves them by a rounding error."""
+LONGEST_OFFSET = 1e12
+"""Beyond this [s], 30,000 years, a double no longer tells tenths of a millisecond."""
 MOST_ROWS = 20_000_000
 """Most rows of an even log; more than that is two clocks mistaken for one."""
 UNIX = 1e8
@@ -134,7 +136,8 @@ def _by_event(held_t: np.ndarray, pose_t: np.ndarray) -> tuple[np.ndarray, np.nd
 
 def _by_period(held_t: np.ndarray, pose_t: np.ndarray, end: float, period: float) -> tuple[np.ndarray, ...]:
     """As `_by_event`, on the even grid; times are compared as counts of periods since the first row."""
-    rows = np.floor((end - held_t[0]) / period + ROUNDING) + 1
+    with np.errstate(over="ignore"):  # infinitely many rows are too many too
+        rows = np.floor((end - held_t[0]) / period + ROUNDING) + 1
     if rows > MOST_ROWS:
         raise InputError(
             f"period: {period:g} s makes {rows:.3g} rows between {held_t[0]:.10g} s and {end:.10g} s; are both streams "
@@ -174,8 +177,10 @@ def _expire(t: np.ndarray, value: Wheels, timeout: float | None, end: float) -> 
 
 
 def _check_settings(pose_offset: float, **positive: float | None) -> None:
-    if not np.isfinite(pose_offset):
-        raise InputError(f"pose_offset: is {pose_offset:g}; it should be a finite time in seconds")
+    if not abs(pose_offset) < LONGEST_OFFSET:
+        raise InputError(
+            f"pose_offset: is {pose_offset:g}; it should be a finite time in seconds, below {LONGEST_OFFSET:g}"
+        )
     for name, value in positive.items():
         if value is not None and not 0.0 < value < np.inf:
             raise InputError(f"{name}: is {value:g}; it should be positive")

@@ -1,7 +1,9 @@
 """Study files: TOML, one key per axis. `EXAMPLE` is one, with every key explained."""
 
 import itertools
+import math
 import os
+import re
 import tomllib
 from collections.abc import Callable
 from typing import Any
@@ -13,7 +15,7 @@ from jaxident.errors import InputError
 from jaxident.files.effect_sets import take_axis, take_sets
 from jaxident.files.models import load_model
 from jaxident.files.schema import take_keys, take_list, take_number, take_object, take_text
-from jaxident.files.source import Source, explained
+from jaxident.files.source import Source, read_text
 from jaxident.robot.drive import Physical
 from jaxident.robot.model import Model, require_physical
 from jaxident.study.design import PARTS, Candidate, Study, check_study
@@ -59,6 +61,15 @@ method = "recursive"        # batch on the setup time, then recursive least squa
 settings = { setup_samples = 100 }              # also forgetting
 """
 
+LARGEST_STUDY = 1 << 20
+"""Bytes of a study file."""
+DEEPEST_KEY = 8
+"""Dots in a key; a study needs two. The time that a key takes to read grows with the square of their number."""
+MOST_ROBOTS = 10_000
+"""Robots that one entry of a study may make: points of its grid times sets of effects."""
+
+_PART = r"(?:[\w-]++|\"[^\"\n]*+\"|'[^'\n]*+')"
+_DEEP_KEY = re.compile(rf"(?<![\w-])(?:{_PART}[ \t]*+\.[ \t]*+){{{DEEPEST_KEY + 1}}}")
 _NEEDED = ("seeds", "noise", "robots", "estimators")
 _FREE = ("name", "excitations", "amplitude", "samples", "period", "effects", "hold", "heading_per_position",
          "correlation_time", "chunk")  # fmt: skip
@@ -66,18 +77,23 @@ _FREE = ("name", "excitations", "amplitude", "samples", "period", "effects", "ho
 
 def read_study(path: Source, *, seed: int = 0) -> Study:
     """The study in a TOML file; models in it are found beside it. InputError names the file and the key at fault."""
-    name = os.fspath(path)
-    with explained(name, "TOML"), open(path, "rb") as stream:
-        text = stream.read().decode("utf-8")
-    return parse_study(text, name, seed=seed)
+    return parse_study(read_text(path, "TOML", LARGEST_STUDY), os.fspath(path), seed=seed)
 
 
 def parse_study(text: str, name: str, *, seed: int = 0) -> Study:
     """The study in a TOML text; `name` is what error lines call it, and models are found beside."""
+    deep = _DEEP_KEY.search(text)
+    if deep:
+        line = text.count("\n", 0, deep.start()) + 1
+        raise InputError(f"{name}, line {line}: a key of more than {DEEPEST_KEY} dots; no key of a study has as many")
     try:
         content = tomllib.loads(text)
+    except RecursionError:
+        raise InputError(f"{name}: lists or tables are nested too deeply") from None
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{name}: not TOML: {error}") from None
+    except ValueError as error:  # an integer of thousands of digits
+        raise InputError(f"{name}: a number cannot be read: {error}") from None
     return study_from_dict(content, name, seed=seed)
 
 
@@ -132,6 +148,8 @@ def _candidates(entry: Any, where: str, folder: str) -> list[Candidate]:
     empty = next((key for key, factors in grid.items() if not factors), None)
     if empty is not None:
         raise InputError(f"{where}: scale.{empty}: is empty; it needs at least one entry")
+    if math.prod(map(len, grid.values())) > MOST_ROBOTS:
+        raise InputError(f"{where}: scale: makes more than {MOST_ROBOTS} robots; give fewer factors")
     points = [dict(zip(grid, point, strict=True)) for point in itertools.product(*grid.values())]
     sets = [("", model)]
     if found["effects"] is not None:
@@ -139,6 +157,8 @@ def _candidates(entry: Any, where: str, folder: str) -> list[Candidate]:
         sets = [each for k, one in enumerate(given) for each in _with_sets(model, one, f"{where}: effects[{k}]")]
         if not sets:
             raise InputError(f"{where}: effects: is empty; it needs at least one set, as [{{}}]")
+    if len(sets) * len(points) > MOST_ROBOTS:
+        raise InputError(f"{where}: effects: makes more than {MOST_ROBOTS} robots; give fewer sets or factors")
     return [
         Candidate(_label(title, point) + more, _scaled(each, point), widths) for more, each in sets for point in points
     ]

@@ -8,8 +8,10 @@ import contextlib
 import csv
 import gzip
 import io
+import math
 import os
 import re
+import stat
 import sys
 import warnings
 from collections.abc import Iterator, Sequence
@@ -23,6 +25,13 @@ from jaxident.files.source import Source, explained
 
 BLOCK_BYTES = 1 << 23
 LONGEST_HEADER = 1 << 16
+LONGEST_LINE = 1 << 20
+"""Characters of a line; a row of a log has some hundreds."""
+MOST_LINES = 20_000_000
+"""Lines of a file, the blank ones too: more than two days at 100 Hz."""
+LARGEST_RATIO, SMALL_TEXT = 100, 1 << 26
+"""A gzipped table unpacks to at most this many times its size, or to this many bytes. Numbers shrink to a tenth; what
+shrinks to less than a hundredth was packed to fill the memory of who unpacks it."""
 GZIP_MAGIC = b"\x1f\x8b"
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
@@ -52,7 +61,7 @@ def read_table(path: Source, layouts: Sequence[Layout], optional: Layout = (), c
     there. Semicolons or tabs may part the cells, decimal commas beside them; t may be an ISO date (then Unix time).
     """
     name = "standard input" if os.fspath(path) == "-" else os.fspath(path)
-    with explained(name, "CSV"), _open_text(path) as stream:
+    with explained(name, "CSV"), _open_text(path) as (stream, most):
         header, lines_read, separator = _read_header(stream, name, layouts)
         columns, change = split_heading(header, columns or {})
         header = rename(header, columns, f"{name}, line {lines_read}")
@@ -62,7 +71,8 @@ def read_table(path: Source, layouts: Sequence[Layout], optional: Layout = (), c
         if ignored:
             warnings.warn(f"{name}: columns ignored: {', '.join(map(repr, ignored))}", stacklevel=2)
         values, line = [np.empty((0, len(wanted)))], [np.empty(0, int)]
-        while lines := [_with_commas(line, separator) for line in stream.readlines(BLOCK_BYTES)]:
+        for block in _blocks(stream, name, most):
+            lines = [_with_commas(text, separator) for text in block]
             filled = np.array([k for k, text in enumerate(lines) if not text.isspace()], int)
             number = lines_read + 1 + filled
             values.append(_read_block([lines[k] for k in filled], header, wanted, name, number))
@@ -91,6 +101,26 @@ def _with_quaternion(layout: Layout, header: list[str]) -> Layout:
 def _with_commas(line: str, separator: str) -> str:
     """A line whose cells commas part; where another sign parted them, commas in it were decimal points."""
     return line if separator == "," else line.replace(",", ".").replace(separator, ",")
+
+
+def _blocks(stream: TextIO, name: str, most: float) -> Iterator[list[str]]:
+    """The lines that are left, some megabytes at a time, each with its line feed but perhaps the last; InputError for
+    more than `most` characters or MOST_LINES lines."""
+    rest, read, lines = "", 0, 0
+    while text := stream.read(BLOCK_BYTES):
+        read, lines = read + len(text), lines + text.count("\n")
+        if read > most:
+            raise InputError(f"{name}: unpacks to more than {LARGEST_RATIO} times its size; no log does, so it is "
+                             "refused before it fills the memory")  # fmt: skip
+        if lines > MOST_LINES:
+            raise InputError(f"{name}: has more than {MOST_LINES} lines; cut it into several logs")
+        whole, feed, rest = (rest + text).rpartition("\n")
+        if len(rest) > LONGEST_LINE:
+            raise InputError(f"{name}: has a line of more than {LONGEST_LINE} characters; is it CSV?")
+        if feed:
+            yield [line + feed for line in whole.split(feed)]
+    if rest:
+        yield [rest]
 
 
 def _read_block(lines: list[str], header: list[str], wanted: Layout, name: str, number: np.ndarray) -> np.ndarray:
@@ -122,7 +152,9 @@ def _parse_line(line: str, number: int, header: list[str], wanted: Layout, name:
     except csv.Error as error:
         raise InputError(f"{place}: {error}") from error
     if len(cells) != len(header):
-        raise InputError(f"{place}: {len(cells)} cells, the header has {len(header)} columns ({','.join(header)})")
+        raise InputError(
+            f"{place}: {len(cells)} cells, the header has {len(header)} columns ({_shortened(','.join(header))})"
+        )
     return [_parse_cell(cells[header.index(column)], column, place) for column in wanted]
 
 
@@ -144,8 +176,12 @@ def _split(line: str) -> list[str]:
     return [cell.strip() for cell in next(csv.reader([line.strip()], skipinitialspace=True), [])]
 
 
-def _quoted(text: str, longest: int = 40) -> str:
-    return repr(text if len(text) <= longest else text[:longest] + "...")
+def _shortened(text: str, longest: int = 40) -> str:
+    return text if len(text) <= longest else text[:longest] + "..."
+
+
+def _quoted(text: str) -> str:
+    return repr(_shortened(text))
 
 
 def _read_header(stream: TextIO, name: str, layouts: Sequence[Layout]) -> tuple[list[str], int, str]:
@@ -178,8 +214,9 @@ def _choose(header: list[str], place: str, layouts: Sequence[Layout], optional: 
 
 
 @contextlib.contextmanager
-def _open_text(path: Source) -> Iterator[TextIO]:
-    """Lines with plain line feeds; bytes that are not UTF-8 come as U+FFFD, so that their cell can be named."""
+def _open_text(path: Source) -> Iterator[tuple[TextIO, float]]:
+    """Lines with plain line feeds, bytes that are not UTF-8 as U+FFFD, so that their cell can be named; and how many
+    characters they may have together."""
     with contextlib.ExitStack() as stack:
         raw: Any = sys.stdin.buffer
         if os.fspath(path) != "-":
@@ -190,4 +227,13 @@ def _open_text(path: Source) -> Iterator[TextIO]:
         content: Any = stack.enter_context(gzip.GzipFile(fileobj=buffered, mode="rb")) if packed else buffered
         text = io.TextIOWrapper(content, encoding="utf-8-sig", errors="replace")
         stack.callback(text.detach)
-        yield text
+        yield text, _most(raw) if packed else math.inf
+
+
+def _most(raw: Any) -> float:
+    """Characters that a gzipped file may unpack to; of a pipe nobody knows the size."""
+    try:
+        status = os.fstat(raw.fileno())
+    except OSError:  # a stream that is no file
+        return math.inf
+    return max(LARGEST_RATIO * status.st_size, SMALL_TEXT) if stat.S_ISREG(status.st_mode) else math.inf

@@ -30,6 +30,12 @@ class Written(NamedTuple):
         return f"{self.symbol} [{self.unit}]" if self.unit else self.symbol
 
 
+def plain(text: str) -> str:
+    """A user's name as matplotlib shows it letter by letter: no dollar makes it a formula, no underscore hides it."""
+    text = text.replace("$", r"\$")
+    return f" {text}" if text.startswith("_") else text
+
+
 def written(name: str) -> Written:
     """How the parameter called `name` in a model (alpha_1, delta_11, dead_zone_r) is written; a name that is none of
     these stands as it is, in the unit of its values."""

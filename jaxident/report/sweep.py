@@ -11,7 +11,7 @@ from jaxident import plot
 from jaxident.array_types import Increment
 from jaxident.files.atomic import Target
 from jaxident.log import make_log
-from jaxident.plot.names import written
+from jaxident.plot.names import plain, written
 from jaxident.plot.studies import Curve
 from jaxident.plot.style import legend_above
 from jaxident.report.page import Figure, Page, Section, Table, write_page
@@ -101,7 +101,7 @@ def _where(summary: xarray.Dataset, at: dict[str, int]) -> str:
 def _curves(summary: xarray.Dataset, at: dict[str, int], name: str) -> Figure:
     cell = summary.isel(at).sel(parameter=name)
     curves = {
-        str(one): Curve(*(cell[part].sel(estimator=one).values for part in Curve._fields))
+        plain(str(one)): Curve(*(cell[part].sel(estimator=one).values for part in Curve._fields))
         for one in summary["estimator"].values
     }
     bound = None
@@ -130,7 +130,7 @@ def _maps(summary: xarray.Dataset, base: dict[str, int]) -> list[Figure]:
         for axis in (axis for axis in base if summary.sizes[axis] > 1):
             rest = {key: k for key, k in base.items() if key != axis}
             middle = cell.isel(rest).median("parameter", skipna=False).transpose(axis, "noise").values
-            labels = [_entry(summary, axis, k) for k in range(summary.sizes[axis])]
+            labels = [plain(_entry(summary, axis, k)) for k in range(summary.sizes[axis])]
             made.append(_map(middle, labels, noise, f"{one}: error of the median parameter [%], by {axis}"))
         if "effect" in base:
             made.append(_effect_map(cell, base, one))
@@ -144,12 +144,13 @@ def _effect_map(share: xarray.DataArray, base: dict[str, int], estimator: str) -
     values = share.isel(rest).transpose("effect", "parameter").values
     symbols = [written(name).symbol for name in DIFFERENCE_ORDER]
     level = f"{1e3 * float(share['noise'][middle]):.3g} mm of camera noise"
-    return _map(values, list(share["effect"].values), symbols, f"{estimator}: error [%] by effect, at {level}")
+    sets = list(map(plain, share["effect"].values))
+    return _map(values, sets, symbols, f"{estimator}: error [%] by effect, at {level}")
 
 
 def _map(values: Any, rows: list[str], columns: list[str], label: str) -> Figure:
     figure, ax = plot.figure(size=(6.3, 0.6 + 0.27 * max(len(rows), 2)))
-    plot.heat_map(values, rows=rows, columns=columns, label=label, ax=ax)
+    plot.heat_map(values, rows=rows, columns=columns, label=plain(label), ax=ax)
     return Figure(plot.image(figure), label)
 
 
@@ -161,7 +162,7 @@ def _histogram(study: Study, trials: xarray.Dataset, summary: xarray.Dataset, na
     column = DIFFERENCE_ORDER.index(name)
     truth = np.asarray(trials["truth"].variable[(*cut, column)])
     estimates = np.asarray(trials["estimate"].variable[(*cut, slice(None), column)])
-    errors = {choice.name: estimates[:, k] - truth for k, choice in enumerate(study.estimators)}
+    errors = {plain(choice.name): estimates[:, k] - truth for k, choice in enumerate(study.estimators)}
     bound = None
     if "rmse_over_bound" in summary:
         cell = summary.isel(at).sel(parameter=name)
@@ -212,9 +213,9 @@ def draw_trial(study: Study, number: int, recording: Recording, outcome: Outcome
     axes[2].lines[1].set_label("without noise")
     legend_above(axes[2])
     pairs = zip(outcome.estimate, outcome.deviation, strict=True)
-    found = {choice.name: pair for choice, pair in zip(study.estimators, pairs, strict=True)}
+    found = {plain(choice.name): pair for choice, pair in zip(study.estimators, pairs, strict=True)}
     plot.estimate_errors(found, truth=outcome.truth, names=DIFFERENCE_ORDER, ax=axes[3])
-    figure.suptitle(_title(study, number), x=0.01, ha="left", fontsize=9)
+    figure.suptitle(plain(_title(study, number)), x=0.01, ha="left", fontsize=9)
     return figure
 
 

@@ -83,4 +83,4 @@ def _both(key: Array, wave: Callable[[Array], Array], amplitude: float) -> Wheel
 
 
 def _hold(levels: Array, samples: int, hold: int) -> Array:
-    return jnp.repeat(levels, hold)[:samples]
+    return levels[jnp.arange(samples) // hold]

@@ -24,7 +24,8 @@ DIFFERENCE_ORDER = (
 class Provenance(NamedTuple):
     """Where a model comes from. duration [s]: of all its logs, after which the session time goes on; runs: the mark by
     which each run is known again (`estimation.session`), and the session time [s] of its first row. from_prior: names
-    of parameters that come mostly from what is known of robots in general, not from these logs."""
+    of parameters that come mostly from what is known of robots in general, not from these logs. at_bound: names of
+    those that stand at a bound of their search."""
 
     version: str = ""
     method: str = ""
@@ -33,6 +34,7 @@ class Provenance(NamedTuple):
     duration: float = 0.0
     runs: tuple[tuple[str, float], ...] = ()
     from_prior: tuple[str, ...] = ()
+    at_bound: tuple[str, ...] = ()
 
 
 class Spread(NamedTuple):

@@ -20,6 +20,7 @@ from jaxident.study.trial import Outcome
 AHEAD = 2
 """Chunks that each worker has in hand: the next one waits there while one is computed."""
 
+LOOPBACK = "127.0.0.1"
 RETRIES = 3
 PATIENCE = "20s"
 
@@ -37,19 +38,34 @@ def connected(scheduler: str) -> Iterator[Any]:
         raise InputError("--scheduler needs Dask: install jaxident with the extra `cluster`") from None
     with contextlib.ExitStack() as stack:
         if local:
-            settings = distributed.LocalCluster(
-                n_workers=int(local[1]),
-                threads_per_worker=1,
-                host="127.0.0.1",
-                dashboard_address=None,
-                silence_logs=logging.CRITICAL,
-            )
-            scheduler = stack.enter_context(settings).scheduler_address
+            scheduler = stack.enter_context(_local_cluster(int(local[1])))
         try:
             client = stack.enter_context(distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False))
         except (OSError, ValueError) as error:
             raise InputError(f"--scheduler {scheduler}: nobody answers there: {error}") from None
         yield client
+
+
+@contextlib.contextmanager
+def _local_cluster(count: int) -> Iterator[str]:
+    """The address of a scheduler with so many workers of one thread, all on the loopback.
+
+    Every part of Dask has a small web server, also where its dashboard is off, and `LocalCluster` opens those of the
+    workers (with Dask 2024.8 the scheduler's too) to the whole network. Here they stand on the loopback, with no pages.
+    """
+    import dask
+    import distributed
+
+    own = {"host": LOOPBACK, "dashboard": False, "dashboard_address": f"{LOOPBACK}:0"}
+    worker = {"cls": distributed.Nanny, "options": {**own, "nthreads": 1, "silence_logs": logging.CRITICAL}}
+    pages = dask.config.set({"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []})
+    cluster = distributed.SpecCluster(
+        workers=dict.fromkeys(range(count), worker),
+        scheduler={"cls": distributed.Scheduler, "options": own},
+        silence_logs=logging.CRITICAL,
+    )
+    with pages, cluster:
+        yield cluster.scheduler_address
 
 
 def run_on(client: Any, study: Study, numbers: Sequence[int]) -> Iterator[tuple[int, Outcome]]:

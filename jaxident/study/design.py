@@ -1,6 +1,7 @@
 """What a Monte-Carlo study runs over: its axes, its robots, its estimators, and whether they make sense."""
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -16,7 +17,12 @@ AXES = ("excitation", "samples", "robot", "effect", "period", "amplitude", "nois
 PARTS = ("rate", "gain", "coupling", "dead_zone")
 """The parts of a robot that a study may scale or spread."""
 
-SMALLEST_RUN = 20
+SMALLEST_RUN, LONGEST_RUN = 20, 10_000_000
+"""Rows of a run: the longest lasts a day at 100 Hz."""
+LONGEST_NAME = 300
+"""Characters of a name; a picture grows with it."""
+MOST_TRIALS = 100_000_000
+"""Trials of a study: some 200 bytes are kept of each and estimator, 20 GB in all."""
 CHUNK = 2000
 HEADING_PER_POSITION = 10.0
 """Heading noise for each metre of position noise [rad/m]: 10 mrad at 1 mm, an overhead camera's usual ratio."""
@@ -97,10 +103,14 @@ class Study(NamedTuple):
 
 def check_study(study: Study, where: str = "study") -> None:
     """InputError naming the key, what is wrong and what would be right; `where` is what the line calls the study."""
+    _check_name(study.name, f"{where}: name")
     _check_axes(study, where)
-    for key in ("seeds", "hold", "chunk"):
-        if getattr(study, key) < 1:
-            raise InputError(f"{where}: {key}: is {getattr(study, key)}; it should be at least 1")
+    for key, most in (("seeds", MOST_TRIALS), ("hold", LONGEST_RUN), ("chunk", MOST_TRIALS)):
+        if not 1 <= getattr(study, key) <= most:
+            raise InputError(f"{where}: {key}: is {getattr(study, key)}; it should be at least 1 and at most {most}")
+    if study.trials > MOST_TRIALS:
+        raise InputError(f"{where}: seeds: with {study.seeds} the axes make {study.trials} trials; {MOST_TRIALS} are "
+                         "the most: take fewer seeds, or cut the study into several")  # fmt: skip
     if study.heading_per_position < 0.0:
         raise InputError(f"{where}: heading_per_position: is {study.heading_per_position:g}; it should not be negative")
     if study.correlation_time is not None and not study.correlation_time > 0.0:
@@ -131,16 +141,27 @@ def _check_axes(study: Study, where: str) -> None:
         raise InputError(f"{where}: noise: {min(study.noise):g} is negative; it is a standard deviation in metres")
     if min(study.samples) < SMALLEST_RUN:
         raise InputError(f"{where}: samples: {min(study.samples)} is too short; a run has at least {SMALLEST_RUN} rows")
+    if max(study.samples) > LONGEST_RUN:
+        raise InputError(f"{where}: samples: {max(study.samples)} is too long; a run has at most {LONGEST_RUN} rows")
 
 
 def _check_axis(values: Sequence[Any], where: str) -> None:
     if not values:
         raise InputError(f"{where}: is empty; it needs at least one entry")
-    if any(isinstance(value, float) and not math.isfinite(value) for value in values):
-        raise InputError(f"{where}: every entry should be a finite number")
-    twice = next((value for value in values if list(values).count(value) > 1), None)
+    for value in values:
+        if isinstance(value, float) and not math.isfinite(value):
+            raise InputError(f"{where}: every entry should be a finite number")
+        if isinstance(value, str):
+            _check_name(value, where)
+    twice = next((value for value, count in Counter(values).items() if count > 1), None)
     if twice is not None:
         raise InputError(f"{where}: {twice!r} stands there twice; keep one")
+
+
+def _check_name(name: str, where: str) -> None:
+    if not (name.isprintable() and name.strip() and len(name) <= LONGEST_NAME):
+        raise InputError(f"{where}: {name[:40]!r} is no name: it should have 1 to {LONGEST_NAME} letters, no control "
+                         "characters")  # fmt: skip
 
 
 def _check_candidate(candidate: Candidate, where: str, duration: float) -> None:

@@ -13,6 +13,7 @@ import pytest
 from jaxident.errors import InputError
 from jaxident.files.json_text import format_json, parse_json
 from jaxident.files.models import SHIPPED, load_model, model_from_dict, model_to_dict, save_model
+from jaxident.numerics import float64_switch
 from jaxident.robot.difference import Difference
 from jaxident.robot.drive import Physical
 from jaxident.robot.model import Effect, Model, Provenance, Spread
@@ -77,7 +78,7 @@ def test_models_of_jax_arrays_are_saved_too():
 
 def test_saving_and_loading_do_not_depend_on_the_precision_of_jax():
     expected = model_to_dict(FULL)
-    with jax.enable_x64(False):
+    with float64_switch(False):
         assert model_to_dict(FULL) == expected
         assert equal(model_from_dict(expected, EFFECTS), FULL)
         assert jnp.ones(1).dtype == np.float32

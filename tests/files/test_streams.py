@@ -244,3 +244,11 @@ def test_the_mrclam_streams_convert_both_ways(shared, tmp_path, robot):
     assert len(used) > 0.8 * len(even.t)
     write_log(even.rows(0, 3000), tmp_path / "log.csv")
     assert np.array_equal(read_log(tmp_path / "log.csv").x, even.x[:3000], equal_nan=True)
+
+
+@pytest.mark.parametrize("settings", [{"pose_offset": 1e308, "period": 1e-9}, {"period": 1e-308}])
+def test_clocks_that_lie_ages_apart_are_refused_without_a_word_of_numpy(settings):
+    commands = Commands(np.arange(3.0), Wheels(np.ones(3), np.ones(3)))
+    poses = Poses(np.arange(3.0), Pose(*np.zeros((3, 3))))
+    with pytest.raises(InputError, match=r"pose_offset: is 1e\+308|period: 1e-308 s makes inf rows"):
+        merge(commands, poses, **settings)

@@ -2,26 +2,13 @@
 
 import csv
 
-import numpy as np
 import pytest
-import xarray
 from support.studies import SMALL, UNDER_EFFECTS
+from support.trials import invented
 
 from jaxident.files.summary import write_summary
 from jaxident.report.sweep import write_study
-from jaxident.study.dataset import FURTHER_AXES, coordinates, layout
 from jaxident.study.statistics import summarise
-
-
-def invented(study):
-    """Trials whose estimates are the truth and an error of one per cent."""
-    draws = np.random.default_rng(0)
-    arrays = {name: np.zeros(shape, kind) for name, (shape, kind) in layout(study).items()}
-    arrays["truth"] += 1.0
-    arrays["deviation"] += 0.01
-    arrays["estimate"] = 1.0 + 0.01 * draws.normal(size=arrays["estimate"].shape)
-    named = {name: (study.axes + FURTHER_AXES[name], array) for name, array in arrays.items()}
-    return xarray.Dataset(named).assign_coords(coordinates(study).coords).assign_attrs(coordinates(study).attrs)
 
 
 @pytest.mark.parametrize(("study", "maps"), [(SMALL, 0), (UNDER_EFFECTS, 1)])

@@ -1,7 +1,9 @@
 """Chunks as tasks of a local Dask cluster; without Dask these are skipped."""
 
+import http.client
 import os
 import signal
+import urllib.request
 
 import numpy as np
 import pytest
@@ -36,3 +38,22 @@ def test_a_worker_that_is_killed_is_survived():
                 os.kill(next(iter(client.run(os.getpid).values())), signal.SIGKILL)
             found[cut[number].cut] = outcome.estimate
     np.testing.assert_array_equal(found, whole)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_everything_listens_on_the_loopback_and_shows_no_page():
+    """The scheduler's and the workers' web servers too, which Dask opens to the network by itself."""
+    psutil = pytest.importorskip("psutil")
+    with connected("local:1"):
+        own = psutil.Process()
+        processes = [own, *own.children(recursive=True)]
+        sockets = [one.laddr for process in processes for one in process.net_connections() if one.status == "LISTEN"]
+        assert len(sockets) >= 4
+        assert {ip for ip, _ in sockets} == {"127.0.0.1"}
+        assert all(port != 8787 for _, port in sockets)
+        for ip, port in sockets:
+            try:
+                urllib.request.urlopen(f"http://{ip}:{port}/health", timeout=5)
+            except (OSError, http.client.HTTPException):
+                continue
+            pytest.fail(f"port {port} shows a page")
