@@ -15,7 +15,12 @@ class OffsetOption(Number):
 
     def convert(self, value, param, ctx):
         """The time, or the word `auto`."""
-        return value if value == "auto" else super().convert(value, param, ctx)
+        if value == "auto":
+            return value
+        try:
+            return super().convert(float(value), param, ctx)
+        except ValueError:
+            self.fail(f"{value!r} is neither a time in seconds nor auto", param, ctx)
 
 
 class OrderOption(click.ParamType):

@@ -50,12 +50,14 @@ def verdicts(model: Model, largest_command: float) -> list[Verdict]:
 
 
 def _with_origin(row: Verdict, origin: Provenance) -> Verdict:
-    """A verdict in the light of how its number came about: at a bound of its search, or from the prior."""
+    """A verdict in the light of how its number came about: from the prior, or at a bound of its search."""
+    if row.parameter in origin.from_prior:
+        return row._replace(verdict=BORROWED, reason=WHY)
     if row.parameter in origin.at_bound:
         if row.parameter.startswith("dead_zone") and row.estimate <= 0.0:
             return row._replace(verdict="weak", reason="it stands at 0, the least a dead zone can be")
         return row._replace(verdict="not determined", reason="it stands at a bound of its search")
-    return row._replace(verdict=BORROWED, reason=WHY) if row.parameter in origin.from_prior else row
+    return row
 
 
 def at_bound(model: Model, d_max: float) -> dict[str, float]:

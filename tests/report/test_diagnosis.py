@@ -142,7 +142,7 @@ def test_models_that_were_not_given_are_not_shown():
 
 def test_nothing_seen_is_a_page_too():
     found = made_up("undecided", given=True)
-    nothing = np.full((3, 4, 3), np.nan)
+    nothing = np.full((4, 4, 3), np.nan)
     gap = found.gap._replace(errors=nothing, floor=np.nan, floor_interval=(np.nan, np.nan))
     account = found.account._replace(rows=[], windows=0)
     page = diagnosis_page(found._replace(gap=gap, account=account, finding=finding_of({}), shrinks={}), "runs")

@@ -45,6 +45,7 @@ def made_up(verdict: str, *, given: bool = False) -> Diagnosis:
     shrink = Shrink(*_shrink(1.0 - (after - 1.0) / 39.0, gap))
     errors = np.stack([level * np.random.default_rng(4).chisquare(3, (COUNT, 3)) / 3.0 for level in levels])
     errors = errors * (np.array([1.5, 0.3, 1.2]) if gap else 1.0)
+    levels, errors = (*levels, after), np.concatenate([errors, errors[-1:]])  # nothing is discovered
     parts = (np.full((COUNT, 3), part) * UNIT for part in (1.0, 0.05, 0.0))
     floor = Floor(*parts, {}, *[np.linspace(0.8, 1.3, 400)] * 2, {}, np.linspace(0.8, 1.3, 400))
     placebo = ("camera_scale", shrinks["camera_scale"])

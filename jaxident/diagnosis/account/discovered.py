@@ -9,7 +9,7 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.account.judging import Judged, judge_model
 from jaxident.diagnosis.account.models import Corrected, corrected_of
 from jaxident.diagnosis.account.shrink import LOW, RESAMPLES, blocks
-from jaxident.diagnosis.account.sized import beside, sized_corrected, with_curves
+from jaxident.diagnosis.account.sized import beside, sized_corrected
 from jaxident.diagnosis.causes.finding import Finding
 from jaxident.diagnosis.discovery.candidates import Kind
 from jaxident.diagnosis.discovery.fit import Bending, as_law
@@ -35,56 +35,56 @@ class Shown(NamedTuple):
 
 
 class Confirmed(NamedTuple):
-    """Curves that the judging rows confirm, each with the fit in which it came last. whole: the corrected model with
-    all of them, and judged there; named: the model with the named effects alone, under the same noise law, of which
-    there are draws; before: how that one does."""
+    """Curves that the judging rows confirm, as fitted together. whole: the corrected model with them; named: with the
+    named effects alone, under the same noise law, of which there are draws. steps: how the model does there without
+    curves, with the first, with the first two and so on."""
 
-    steps: list[Bending]
+    bending: Bending
     whole: Corrected
-    judged: Judged
     named: Corrected
-    before: Judged
     draws: Draws
+    steps: list[Judged]
 
     @property
     def model(self) -> Model:
         """The corrected model."""
         return self.whole.model
 
+    @property
+    def judged(self) -> Judged:
+        """How it does on the judging rows."""
+        return self.steps[-1]
+
 
 def confirm(prepared: Prepared, finding: Finding, direct: dict, seed: int) -> Confirmed | None:
-    """The most curves, in the order in which they were found, that take error away on the judging rows, 95 % surely;
-    None if none do. The judging rows only accept or refuse: they change no number of a curve."""
-    steps = discover(finding)
-    while steps:
-        whole, draws = sized_corrected(prepared, beside(finding, steps[-1]), direct, seed, steps[-1])
+    """Curves in the order in which they were found, as long as each takes error away on the judging rows beside those
+    before it, 95 % surely; None if the first does not. The judging rows only accept or refuse: they change no number of
+    a curve."""
+    bendings = discover(finding)
+    if not bendings:
+        return None
+    plain, _ = sized_corrected(prepared, finding, direct, seed)
+    steps, found = [judge_model(_plain(plain.model), prepared)], None
+    for bending in bendings:
+        whole, draws = sized_corrected(prepared, beside(finding, bending), direct, seed, bending)
+        judged, unit = judge_model(whole.model, prepared), deviations(whole.law) ** 2
+        share, p_value = _taken(steps[-1], judged, steps[-1].error ** 2 / unit, unit, seed)
+        if share <= 0.0 or p_value >= LOW:
+            break
+        steps = [*steps, judged]
         named = corrected_of(prepared, finding, whole.law, direct)
-        judged, before = judge_model(whole.model, prepared), judge_model(_plain(named.model), prepared)
-        unit = deviations(whole.law) ** 2
-        share, p_value = _taken(before, judged, before.error**2 / unit, unit, seed)
-        if share > 0.0 and p_value < LOW:
-            return Confirmed(steps, whole, judged, named, before, draws)
-        steps = steps[:-1]
-    return None
+        found = Confirmed(bending, whole, named, draws, steps)
+    return found
 
 
-def each_law(
-    prepared: Prepared, finding: Finding, found: Confirmed, total: Array, unit: Array, seed: int
-) -> tuple[Shown, ...]:
+def each_law(prepared: Prepared, found: Confirmed, total: Array, unit: Array, seed: int) -> tuple[Shown, ...]:
     """Every law with what it takes away beside those that were found before it, all else refitted; total (starts, 3):
     squares of the refitted nominal model over the camera's variances `unit` (3,)."""
-    shown, last = [], found.before
-    for k, step in enumerate(found.steps, 1):
-        if k == len(found.steps):
-            now = found.judged
-        else:
-            part = corrected_of(prepared, beside(finding, step), found.whole.law, found.whole.direct)
-            now = judge_model(_plain(with_curves(part, step, prepared.largest).model), prepared)
-        share, p_value = _taken(last, now, total, unit, seed)
-        curve, last = found.steps[-1].curves[k - 1], now
+    shown = []
+    for curve, before, after in zip(found.bending.curves, found.steps[:-1], found.steps[1:], strict=True):
+        share, p_value = _taken(before, after, total, unit, seed)
         law = as_law(curve, prepared.largest)
-        density = tuple(int(n) for n in curve.density)
-        shown.append(Shown(curve.kind, law, density, share, p_value, form_of(curve, law)))
+        shown.append(Shown(curve.kind, law, tuple(map(int, curve.density)), share, p_value, form_of(curve, law)))
     return tuple(shown)
 
 

@@ -120,7 +120,7 @@ def measure(prepared: Prepared, finding: Finding, given: Model | None, common, d
     if players and finding.unexplained <= UNEXPLAINED:
         moved = _moved(everybody, judge_model(without(bare, players), prepared), unit)
     place = locate(errors[1], floor.total / unit, everybody.path, prepared, moved, seed)
-    laws = () if shown is None else each_law(prepared, finding, shown, errors[1], unit, seed)
+    laws = () if shown is None else each_law(prepared, shown, errors[1], unit, seed)
     return Measured(gap, account, place, shrinks, corrected.model if shown is None else shown.model, laws)
 
 
