@@ -1,8 +1,11 @@
 """What a diagnosis discovered, in words and as a picture: laws that are in no catalogue."""
 
+import dataclasses
+
 from jaxident import plot
 from jaxident.diagnosis.account.discovered import Shown
 from jaxident.diagnosis.diagnose import Diagnosis
+from jaxident.diagnosis.discovery.forms import beyond
 from jaxident.effects.discovered import ACTS, SIGNALS
 from jaxident.report.page import Figure, Section, Table
 from jaxident.report.words import number, percent
@@ -19,8 +22,8 @@ SEEN = (
     "Beyond the signals that these logs show, a curve stays at its last value: that is a guess."
 )
 CAPTION = (
-    "Line: the curve; shade: two standard deviations; below: how often the robot was there. What the nominal model has "
-    "itself (rates, gains) may be shared with it in another way, so that a straight line may be added to both."
+    "Line: the curve; shade: two standard deviations; grey bars: how often the robot was there. A straight line that "
+    "the nominal model could have as well (in its rates and gains) is taken away."
 )
 
 
@@ -50,7 +53,8 @@ def discovered(found: Diagnosis) -> list[Section]:
         law = shown.law
         factor = {"1": "", "v": " per m/s", "w": " per rad/s"}[law.times]
         unit = f"{ACTS[law.acts_on]}{factor}"
-        plot.discovered(law, shown.density, ax=ax, xlabel=f"{SIGNAL_WORDS[law.signal]} [{SIGNALS[law.signal]}]",
+        told = dataclasses.replace(law, value=beyond(law, shown.density))
+        plot.discovered(told, shown.density, ax=ax, xlabel=f"{SIGNAL_WORDS[law.signal]} [{SIGNALS[law.signal]}]",
                         ylabel=f"{law.acts_on}\n[{unit}]")  # fmt: skip
     rows = [
         (shown.law.acts_on, f"{TIMES_WORDS[shown.law.times]}a curve of the {SIGNAL_WORDS[shown.law.signal]}",

@@ -11,7 +11,7 @@ from jaxident.diagnosis.causes.finding import find_effects
 from jaxident.diagnosis.discovery.candidates import KINDS, Kind, hats
 from jaxident.diagnosis.discovery.curves import bend, solved
 from jaxident.diagnosis.discovery.fit import Curve, as_law
-from jaxident.diagnosis.discovery.forms import form_of
+from jaxident.diagnosis.discovery.forms import beyond, form_of
 from jaxident.diagnosis.discovery.search import discover
 from jaxident.diagnosis.prepare import prepare
 from jaxident.log import join, make_log
@@ -79,6 +79,15 @@ def test_simple_forms_are_recognised(kind, value, form):
     assert found is not None
     assert found.form == form
     assert found.part_explained > 0.95
+
+
+def test_what_the_nominal_robot_has_as_well_is_taken_away():
+    law = as_law(curve_of(Kind("push of each wheel", "1", "own push"), 0.4 * AT - 0.3 * AT**3))
+    left = beyond(law, np.ones(KNOTS))
+    assert abs(np.sum(left * AT)) < 1e-9
+    np.testing.assert_allclose(np.diff(left, 2), np.diff(-0.3 * AT**3, 2), atol=1e-12)
+    camera = as_law(curve_of(Kind("pose ahead", "1", "x"), 0.02 * AT))
+    np.testing.assert_array_equal(beyond(camera, np.ones(KNOTS)), 0.02 * AT)
 
 
 def test_a_wild_curve_looks_like_nothing():

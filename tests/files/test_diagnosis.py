@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from support.diagnoses import VERDICTS, made_up
+from support.diagnoses import VERDICTS, discovered_law, made_up
 
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.files.diagnosis import diagnosis_to_dict
@@ -50,3 +50,15 @@ def test_regions_of_commands_are_in_the_users_unit():
     for variable, low in inner:
         factor = found.prepared.largest if "u" in variable else 1.0
         assert any(abs(value - factor * low) < 1e-12 for name, value in told.items() if name == variable)
+
+
+def test_a_discovered_law_has_the_keys_of_the_schema():
+    content = diagnosis_to_dict(made_up("partly")._replace(discovered=(discovered_law(),)))
+    assert json.loads(json.dumps(content, allow_nan=False)) == content
+    (law,) = content["discovered"]
+    keys = {"site", "acts_on", "inputs", "memory", "curve", "share", "p_value", "looks_like"}
+    assert law.keys() >= keys
+    assert (law["site"], law["inputs"], law["memory"]) == ("drive", ["w", "v"], None)
+    assert all(point.keys() == {"at", "value", "standard_deviation"} for point in law["curve"])
+    assert law["looks_like"].keys() == {"form", "parameters", "part_explained"}
+    assert diagnosis_to_dict(made_up("partly"))["discovered"] is None

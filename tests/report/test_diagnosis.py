@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.diagnoses import LARGEST, VERDICTS, finding_of, made_up
+from support.diagnoses import LARGEST, VERDICTS, discovered_law, finding_of, made_up
 
 from jaxident.diagnosis.diagnose import Parameter
 from jaxident.diagnosis.visible import smallest_sizes
@@ -208,3 +208,12 @@ def test_a_side_of_the_marker_that_nothing_tells_is_said(effects, told):
         diagnosis_page(found._replace(finding=finding, selected=effects), "runs"), "Which effect causes it"
     ).blocks
     assert (BESIDE in blocks) == (not told)
+
+
+def test_discovered_laws_have_a_section_a_picture_and_a_sentence():
+    found = made_up("partly")._replace(discovered=(discovered_law(),))
+    page = diagnosis_page(found, "runs")
+    assert "speed times a curve of the turn rate w (97\N{NO-BREAK SPACE}% of it is c s^2 with s = w" in page.lead
+    blocks = section(page, "What was discovered").blocks
+    assert any(isinstance(block, Figure) and block.png for block in blocks)
+    assert "with discovered laws" in str(section(page, "How large the gap is").blocks)

@@ -6,6 +6,7 @@ import numpy as np
 from support.tables import table_of
 
 from jaxident.diagnosis.account.account import account_of
+from jaxident.diagnosis.account.discovered import Shown
 from jaxident.diagnosis.account.floor import Floor
 from jaxident.diagnosis.account.shrink import Shrink
 from jaxident.diagnosis.account.where import Place, Region
@@ -14,6 +15,8 @@ from jaxident.diagnosis.causes.finding import Finding, Values
 from jaxident.diagnosis.causes.refit import Solution
 from jaxident.diagnosis.causes.unexplained import Rest
 from jaxident.diagnosis.diagnose import Diagnosis, Gap, Parameter
+from jaxident.diagnosis.discovery.candidates import Kind
+from jaxident.diagnosis.discovery.forms import Form
 from jaxident.diagnosis.frames import Frames
 from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.prepare import Prepared
@@ -22,7 +25,7 @@ from jaxident.diagnosis.verdict import Cause, Judgement
 from jaxident.effects.catalogue import SITES
 from jaxident.effects.coordinates import COORDINATES, NOMINAL, free_places, neutral_vector
 from jaxident.robot.drive import Physical
-from jaxident.robot.model import Effect, Model
+from jaxident.robot.model import Discovered, Effect, Model
 
 VERDICTS = ("no_gap", "parameters", "effects", "partly", "unknown", "undecided")
 LARGEST = 2.0
@@ -162,3 +165,10 @@ def _table(names: tuple[str, ...], selected: tuple[str, ...], gain: float):
         columns[..., lag] = 0.99 * columns[..., delay] + 0.14 * columns[..., lag]
     residual = columns[..., [names.index(name) for name in selected]].sum(axis=2) * np.sqrt(2.0 * abs(gain))
     return table_of(columns, residual + rng.normal(size=residual.shape), names, scale=20.0, here=selected)
+
+
+def discovered_law() -> Shown:
+    """A made-up law: speed that falls with the square of the turn rate."""
+    at = np.linspace(-1.0, 1.0, 10)
+    law = Discovered("acceleration along", "v", "w", at, -0.3 * at**2, np.full(10, 0.01))
+    return Shown(Kind("acceleration along", "v", "w"), law, (5,) * 10, 0.4, 0.001, Form("c s^2", {"c": -0.3}, 0.97))

@@ -1,6 +1,6 @@
 """What a discovered curve looks like: the simple form that explains most of it, where the robot has been."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -76,6 +76,14 @@ def form_of(curve: Curve, law: Discovered) -> Form | None:
         if best is None or part > best.part_explained + SIMPLER:
             best = Form(name, {"c": size, **more}, part)
     return best if best is not None and best.part_explained >= LIKE else None
+
+
+def beyond(law: Discovered, density: Sequence[int]) -> np.ndarray:
+    """The values of a law less the part that the nominal robot could have as well, where the robot has been."""
+    value, own, root = np.asarray(law.value), _own(law), np.sqrt(np.maximum(np.asarray(density, float), 1e-9))
+    if not own.shape[1]:
+        return value
+    return value - own @ np.linalg.lstsq(root[:, None] * own, root * value, rcond=None)[0]
 
 
 def _own(law: Discovered) -> np.ndarray:
