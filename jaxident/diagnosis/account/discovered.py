@@ -57,9 +57,9 @@ class Confirmed(NamedTuple):
 
 
 def confirm(prepared: Prepared, finding: Finding, direct: dict, seed: int) -> Confirmed | None:
-    """Curves in the order in which they were found, as long as each takes error away on the judging rows beside those
-    before it, 95 % surely; None if the first does not. The judging rows only accept or refuse: they change no number of
-    a curve."""
+    """The most curves, in the order in which they were found, that together take error away on the judging rows, 95 %
+    surely, the last one some beside the others; None if none do. Two halves of one law may do so together only. The
+    judging rows accept or refuse: they change no number of a curve."""
     bendings = discover(finding)
     if not bendings:
         return None
@@ -67,13 +67,14 @@ def confirm(prepared: Prepared, finding: Finding, direct: dict, seed: int) -> Co
     steps, found = [judge_model(_plain(plain.model), prepared)], None
     for bending in bendings:
         whole, draws = sized_corrected(prepared, beside(finding, bending), direct, seed, bending)
-        judged, unit = judge_model(whole.model, prepared), deviations(whole.law) ** 2
-        share, p_value = _taken(steps[-1], judged, steps[-1].error ** 2 / unit, unit, seed)
-        if share <= 0.0 or p_value >= LOW:
-            break
-        steps = [*steps, judged]
-        named = corrected_of(prepared, finding, whole.law, direct)
-        found = Confirmed(bending, whole, named, draws, steps)
+        unit = deviations(whole.law) ** 2
+        steps = [*steps, judge_model(whole.model, prepared)]
+        (share, p_value), (more, _) = (
+            _taken(before, steps[-1], steps[0].error ** 2 / unit, unit, seed) for before in (steps[0], steps[-2])
+        )
+        if min(share, more) > 0.0 and p_value < LOW:
+            named = corrected_of(prepared, finding, whole.law, direct)
+            found = Confirmed(bending, whole, named, draws, steps)
     return found
 
 
