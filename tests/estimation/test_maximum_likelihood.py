@@ -74,6 +74,7 @@ def test_exact_data_are_recovered():
     np.testing.assert_allclose(found.model.dead_zone, DEAD_ZONE, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_errors_stay_near_the_bound_and_intervals_cover():
     """RMS over the bound of 8 parameters in 48 trials: each is within 1 +- 3 / sqrt(2 * 48), their mean (correlated) in
     a narrower band; 384 intervals cover 95 % within 3 standard errors of some 2 %."""

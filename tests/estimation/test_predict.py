@@ -105,9 +105,8 @@ def test_deviations_are_the_spread_over_seeds():
         assert np.std(ends, ddof=1) == pytest.approx(told, rel=0.26)
 
 
-@pytest.mark.parametrize(
-    "noise", [pytest.param(Noise(1e-3, 1e-2, 0.1), marks=pytest.mark.slow), Noise(1e-3, 1e-2, None, 0.01, 0.2)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", [Noise(1e-3, 1e-2, 0.1), Noise(1e-3, 1e-2, None, 0.01, 0.2)])
 def test_bands_cover_under_slip_and_uncertain_parameters(noise):
     """200 runs, each predicted by a model of its own whose parameters are 1 % off: 95 % bands of three channels cover
     the true pose within four standard errors, 4 * sqrt(0.05 * 0.95 / 200) of each channel."""

@@ -34,6 +34,7 @@ def test_simple_ways_find_plain_effects(names, drawn):
     assert baselines.commonest(given)["selected"] == [baselines.COMMONEST]
 
 
+@pytest.mark.slow
 def test_full_refits_predict_runs_kept_apart_best_with_what_is_there(drawn):
     """With it they miss by little more than the camera's variance, which the filtered start adds to; without, by many
     times that."""

@@ -15,6 +15,7 @@ DRIVE = Physical(np.array([0.541386, 7.817043]), np.array([[0.128988, 0.127287],
 DIAGONAL = Model(1.0 / 30.0, DRIVE, np.array([0.25, 0.2]))
 
 
+@pytest.mark.slow
 def test_likelihood_knows_of_the_camera_and_the_papers_method_does_not():
     study = SMALL._replace(
         robots=(Candidate("diagonal", DIAGONAL, (0.0, 0.0, 0.0, 0.0)),),
