@@ -42,6 +42,7 @@ def diagnosis_to_dict(found: Diagnosis) -> dict[str, Any]:
         "not_testable": found.not_testable,
         "replays": _replays(found.replay),
         "terms": [{"site": term.site, "term": term.name, "gain": gain} for term, gain in found.finding.rest.terms],
+        "suspicions": list(found.suspicions),
         "next": found.next,
     }
 
