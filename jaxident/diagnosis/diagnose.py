@@ -176,7 +176,7 @@ def advice(verdict: str, judgement: Judgement, laws: tuple[Shown, ...] = ()) -> 
     if verdict in ("unknown", "partly") and laws:
         signal = laws[0].law.signal
         begin = "Ask what on the robot could make the discovered curve."
-        return f"{begin} Runs over a wider range of {signal} would sharpen it."
+        return f"{begin} Runs in which its signal ({signal}) varies more would tell it better."
     if verdict in ("unknown", "partly"):
         return "No effect of the catalogue explains what is left: record runs that stay in the regions where it lies."
     return "Nothing more is needed for this question; a longer log would find fainter effects."

@@ -7,6 +7,7 @@ that loses speed in turns has v times a curve of w. Both integrators take laws f
 one name that no effect of the catalogue has.
 """
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -14,6 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxident.array_types import Array, Pose, Wheels
+from jaxident.effects.effect import UNIT
 from jaxident.effects.signals import Motion
 from jaxident.errors import InputError
 from jaxident.numerics import sin_cos, wrap
@@ -26,13 +28,14 @@ MOST_LAWS, MOST_KNOTS = 3, 16
 """Of one model: every set of laws runs through one compiled program."""
 ACTS = {
     "acceleration along": "m/s^2", "acceleration in heading": "rad/s^2", "speed sideways": "m/s",
-    "push of each wheel": "unit", "pose ahead": "m", "pose to the left": "m", "reported heading": "rad",
+    "push of each wheel": UNIT, "pose ahead": "m", "pose to the left": "m", "reported heading": "rad",
 }  # fmt: skip
 """What a law may add to, and the unit."""
-BY_CAMERA = ("pose ahead", "pose to the left", "reported heading")
+ALONG, HEADING, SIDEWAYS, WHEELS, AHEAD, LEFT, TURN = ACTS
+BY_CAMERA = (AHEAD, LEFT, TURN)
 SIGNALS = {
-    "v": "m/s", "w": "rad/s", "heading": "rad", "x": "m", "y": "m", "time": "s", "push right": "unit",
-    "push left": "unit", "own speed": "unit", "own push": "unit",
+    "v": "m/s", "w": "rad/s", "heading": "rad", "x": "m", "y": "m", "time": "s", "push right": UNIT,
+    "push left": UNIT, "own speed": UNIT, "own push": UNIT,
 }  # fmt: skip
 """What a curve may depend on, and the unit. time: session time. own speed, own push: of the wheel that is pushed; a
 wheel's speed is in the commands that hold it."""
@@ -72,7 +75,7 @@ def check_discovered(laws: Sequence[Discovered]) -> None:
         by_camera, own = law.acts_on in BY_CAMERA, law.signal.startswith("own ")
         if by_camera and (law.signal not in OF_CAMERA or law.times != "1"):
             raise InputError(f"discovered: an error of the camera is 1 times a curve of {' or '.join(OF_CAMERA)}")
-        if own != (law.acts_on == "push of each wheel") or (own and law.times != "1"):
+        if own != (law.acts_on == WHEELS) or (own and law.times != "1"):
             raise InputError("discovered: a push of each wheel is 1 times a curve of the wheel's own speed or push")
         at = np.asarray(law.at, float)
         if not 2 <= len(at) <= MOST_KNOTS:
@@ -88,7 +91,7 @@ def laws_of(laws: Sequence[Discovered], largest: float = 1.0) -> Laws | None:
     if not laws:
         return None
     count = MOST_LAWS - len(laws)
-    rows = [_padded(law, largest) for law in laws]
+    rows = [_padded(scaled(law, 1.0 / largest)) for law in laws]
     codes = np.array(
         [(list(ACTS).index(law.acts_on), TIMES.index(law.times), list(SIGNALS).index(law.signal)) for law in laws]
         + [(0, 0, 0)] * count
@@ -99,10 +102,18 @@ def laws_of(laws: Sequence[Discovered], largest: float = 1.0) -> Laws | None:
     return Laws(act, times, signal, at, value)
 
 
-def _padded(law: Discovered, largest: float) -> tuple[np.ndarray, np.ndarray]:
-    """Knots and values for commands over `largest`, the last value repeated beyond the last knot."""
-    along, up = (largest if unit == "unit" else 1.0 for unit in (SIGNALS[law.signal], ACTS[law.acts_on]))
-    at, value = np.asarray(law.at, float) / along, np.asarray(law.value, float) / up
+def scaled(law: Discovered, factor: float) -> Discovered:
+    """The law for commands that are `factor` times as large."""
+    along, up = (factor if unit == UNIT else 1.0 for unit in (SIGNALS[law.signal], ACTS[law.acts_on]))
+    spread = None if law.standard_deviation is None else up * np.asarray(law.standard_deviation)
+    return dataclasses.replace(
+        law, at=along * np.asarray(law.at, float), value=up * np.asarray(law.value, float), standard_deviation=spread
+    )
+
+
+def _padded(law: Discovered) -> tuple[np.ndarray, np.ndarray]:
+    """MOST_KNOTS knots and values, the last value repeated beyond the last knot."""
+    at, value = law.at, law.value
     more = MOST_KNOTS - len(at)
     beyond = at[-1] + (1.0 + np.arange(more)) * (at[-1] - at[0])
     return np.concatenate([at, beyond]), np.concatenate([value, np.full(more, value[-1])])
@@ -121,9 +132,9 @@ def pushed(settings: Mapping[str, Any], drive: Physical, now: Motion, here: Here
     by_speed = _each(laws.signal == list(SIGNALS).index("own speed"), now.v)
     own = [jnp.where(by_speed, n, m) for n, m in zip(wheel_speeds(drive, now.v, now.w), here.push, strict=True)]
     whole, right, left = (_curves(laws, signal) for signal in (_signal(laws, now, here), *own))
-    wheels = force(drive, Wheels(_sum(laws, 3, right), _sum(laws, 3, left)))
+    wheels = force(drive, Wheels(_sum(laws, WHEELS, right), _sum(laws, WHEELS, left)))
     whole = whole * _factor(laws, now)
-    return Force(_sum(laws, 0, whole) + wheels.along, _sum(laws, 1, whole) + wheels.heading)
+    return Force(_sum(laws, ALONG, whole) + wheels.along, _sum(laws, HEADING, whole) + wheels.heading)
 
 
 def sideways(settings: Mapping[str, Any], now: Motion, here: Here) -> Array:
@@ -131,7 +142,7 @@ def sideways(settings: Mapping[str, Any], now: Motion, here: Here) -> Array:
     if DISCOVERED not in settings:
         return 0.0
     laws: Laws = settings[DISCOVERED]["laws"]
-    return _sum(laws, 2, _curves(laws, _signal(laws, now, here)) * _factor(laws, now))
+    return _sum(laws, SIDEWAYS, _curves(laws, _signal(laws, now, here)) * _factor(laws, now))
 
 
 def shifted(settings: Mapping[str, Any], pose: Pose, true: Pose) -> Pose:
@@ -143,7 +154,7 @@ def shifted(settings: Mapping[str, Any], pose: Pose, true: Pose) -> Pose:
     still = jnp.zeros_like(true.x)
     here = Here(true.x, true.y, still, Wheels(still, still))
     error = _curves(laws, _signal(laws, Motion(still, still, true.theta), here))
-    ahead, left, turn = (_sum(laws, place, error) for place in (4, 5, 6))
+    ahead, left, turn = (_sum(laws, act, error) for act in BY_CAMERA)
     return Pose(pose.x + ahead * cosine - left * sine, pose.y + ahead * sine + left * cosine, pose.theta + turn)
 
 
@@ -160,7 +171,7 @@ def _curves(laws: Laws, signal: Array) -> Array:
 
 
 def _signal(laws: Laws, now: Motion, here: Here) -> Array:
-    """The signal of every law (laws, ...); that of a wheel's own stands elsewhere."""
+    """The signal of every law (laws, ...); 0 for signals of a wheel's own, which differ by wheel (`pushed`)."""
     still = jnp.zeros_like(now.v)
     signals = (now.v, now.w, wrap(now.theta), here.x, here.y, here.time, *here.push, still, still)
     return jnp.stack([jnp.broadcast_to(signal, still.shape) for signal in signals])[laws.signal]
@@ -172,10 +183,10 @@ def _factor(laws: Laws, now: Motion) -> Array:
 
 
 def _each(values: Array, like: Array) -> Array:
-    """Values (laws, ...) with as many axes more as an array of any shape has."""
+    """Values (laws, ...) with one axis of length 1 more for each axis of `like`."""
     return jnp.reshape(values, (*jnp.shape(values), *([1] * jnp.ndim(like))))
 
 
-def _sum(laws: Laws, act: int, values: Array) -> Array:
-    """The sum over the laws that act at one place of their values (laws, ...)."""
-    return jnp.sum(jnp.where(_each(laws.act == act, values[0]), values, 0.0), axis=0)
+def _sum(laws: Laws, act: str, values: Array) -> Array:
+    """The sum of the values (laws, ...) of those laws that add to one of ACTS."""
+    return jnp.sum(jnp.where(_each(laws.act == list(ACTS).index(act), values[0]), values, 0.0), axis=0)

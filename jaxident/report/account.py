@@ -45,7 +45,8 @@ TEXT = (
 )
 PICTURE = (
     "Each bar begins where the one above ends; all together are the whole error. Grey: what no model can take away. "
-    f"Blue: named effects. Black: not explained. Red lines: 90{SPACE}% intervals of where a bar ends."
+    "Blue: named effects and what was discovered. Black: not explained. "
+    f"Red lines: 90{SPACE}% intervals of where a bar ends."
 )
 CAPTION = (
     "Root mean squares; squares add up, millimetres do not. The share of an effect is what adding it to the model "

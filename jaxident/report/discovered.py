@@ -18,12 +18,13 @@ SIGNAL_WORDS = {
 TIMES_WORDS = {"1": "", "v": "speed times ", "w": "turn rate times "}
 SEEN = (
     "These laws are in no catalogue. They were found on the runs that fit, and runs that took no part in that confirm "
-    "them. Each adds a curve of one signal at one place. The corrected model has them, and every command obeys them. "
+    "them. Each adds a curve of one signal at one place. The corrected model has them, and `predict` and "
+    "`simulate` obey them; `plan` and studies do not run them. "
     "Beyond the signals that these logs show, a curve stays at its last value: that is a guess."
 )
 CAPTION = (
     "Line: the curve; shade: two standard deviations; grey bars: how often the robot was there. A straight line that "
-    "the nominal model could have as well (in its rates and gains) is taken away."
+    "the nominal model could have as well (in its rates and gains) is taken away; the shade still has its doubt."
 )
 
 

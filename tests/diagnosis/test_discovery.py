@@ -60,7 +60,7 @@ def test_noise_alone_brings_no_curve():
 
 
 def curve_of(kind: Kind, value) -> Curve:
-    return Curve(kind, AT, value, np.full(KNOTS, 0.01), 1.0, np.ones(KNOTS), 20.0, 20.0)
+    return Curve(kind, AT, value, np.full(KNOTS, 0.01), 1.0, np.ones(KNOTS))
 
 
 @pytest.mark.parametrize(
@@ -75,7 +75,7 @@ def curve_of(kind: Kind, value) -> Curve:
 )
 def test_simple_forms_are_recognised(kind, value, form):
     curve = curve_of(kind, value)
-    found = form_of(curve, as_law(curve))
+    found = form_of(as_law(curve), curve.density)
     assert found is not None
     assert found.form == form
     assert found.part_explained > 0.95
@@ -92,7 +92,7 @@ def test_what_the_nominal_robot_has_as_well_is_taken_away():
 
 def test_a_wild_curve_looks_like_nothing():
     curve = curve_of(Kind("pose ahead", "1", "x"), np.cos(np.pi * np.arange(KNOTS)))
-    assert form_of(curve, as_law(curve)) is None
+    assert form_of(as_law(curve), curve.density) is None
 
 
 def test_every_kind_can_be_run():

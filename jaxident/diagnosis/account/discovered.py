@@ -56,16 +56,15 @@ class Confirmed(NamedTuple):
         return self.steps[-1]
 
 
-def confirm(prepared: Prepared, finding: Finding, direct: dict, seed: int) -> Confirmed | None:
+def confirm(prepared: Prepared, finding: Finding, direct: dict, seed: int, plain: Corrected) -> Confirmed | None:
     """The most curves, in the order in which they were found, that together take error away on the judging rows, 95 %
-    surely, the last one some beside the others; None if none do. Two halves of one law may do so together only. The
-    judging rows accept or refuse: they change no number of a curve."""
-    bendings = discover(finding)
-    if not bendings:
-        return None
-    plain, _ = sized_corrected(prepared, finding, direct, seed)
-    steps, found = [judge_model(_plain(plain.model), prepared)], None
-    for bending in bendings:
+    surely, and of which the last takes some beside the others; None if none do. Two halves of one law may do so
+    together only. The judging rows accept or refuse: they change no number of a curve. plain: the corrected model
+    without curves."""
+    steps: list[Judged] = []
+    found = None
+    for bending in discover(finding):
+        steps = steps or [judge_model(_plain(plain.model), prepared)]
         whole, draws = sized_corrected(prepared, beside(finding, bending), direct, seed, bending)
         unit = deviations(whole.law) ** 2
         steps = [*steps, judge_model(whole.model, prepared)]
@@ -85,7 +84,8 @@ def each_law(prepared: Prepared, found: Confirmed, total: Array, unit: Array, se
     for curve, before, after in zip(found.bending.curves, found.steps[:-1], found.steps[1:], strict=True):
         share, p_value = _taken(before, after, total, unit, seed)
         law = as_law(curve, prepared.largest)
-        shown.append(Shown(curve.kind, law, tuple(map(int, curve.density)), share, p_value, form_of(curve, law)))
+        density = tuple(map(int, curve.density))
+        shown.append(Shown(curve.kind, law, density, share, p_value, form_of(law, density)))
     return tuple(shown)
 
 

@@ -86,8 +86,9 @@ class Measured(NamedTuple):
 def measure(prepared: Prepared, finding: Finding, given: Model | None, common, direct: dict, seed: int = 0) -> Measured:
     """The gap before and after, the account, where it lies, and the shrink of each single effect; `given` is the model
     as given, `common` are effects that it has already, `direct` parameters of effects that show without a refit."""
-    shown = confirm(prepared, finding, direct, seed)
-    corrected, draws = (shown.named, shown.draws) if shown else sized_corrected(prepared, finding, direct, seed)
+    corrected, draws = sized_corrected(prepared, finding, direct, seed)
+    if (shown := confirm(prepared, finding, direct, seed, corrected)) is not None:
+        corrected, draws = shown.named, shown.draws
     law = corrected.law
     bare = dataclasses.replace(corrected.model, covariance=None, parameter_order=())
     players = players_of(corrected, common)
@@ -95,11 +96,10 @@ def measure(prepared: Prepared, finding: Finding, given: Model | None, common, d
         joined: judge_model(model, prepared) for joined, model in with_players(prepared, finding, corrected, players)
     }
     nobody, everybody = judged[frozenset()], judged[frozenset(players)]
-    told = None if given is None else dataclasses.replace(given, noise=corrected.model.noise)
-    before = nobody if told is None else judge_model(told, prepared)
+    noise = corrected.model.noise
+    before = nobody if given is None else judge_model(dataclasses.replace(given, noise=noise), prepared)
     floor = floor_of(corrected.model, everybody, prepared, law, draws)
-    unit = deviations(law) ** 2
-    last = everybody if shown is None else shown.judged
+    unit, last = deviations(law) ** 2, everybody if shown is None else shown.judged
     missed = {joined: one.error for joined, one in judged.items()}
     account = account_of(prepared.horizon, missed, players, floor, unit, seed, last.error)
     errors = np.stack([one.error**2 / unit for one in (before, nobody, everybody, last)])

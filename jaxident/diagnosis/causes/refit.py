@@ -74,7 +74,7 @@ def refit(data: Data, vector: Array, starts: Array, effects: tuple[str, ...], ho
             damping *= 10.0
             if damping > 1e6:
                 break
-    return Solution(vector, starts, places, linear, cost, covariance_of(products), step_number)
+    return Solution(vector, starts, places, linear, cost, covariance_from(products), step_number)
 
 
 def _around(data: Data, vector: Array, starts: Array, places: list[int]) -> tuple[Linear, np.ndarray, np.ndarray]:
@@ -129,7 +129,7 @@ def _step(products: Array, now: Array, low: Array, high: Array, damping: float) 
     return step, float(step @ products[:-1, -1] - 0.5 * step @ products[:-1, :-1] @ step)
 
 
-def covariance_of(products: Array) -> np.ndarray:
+def covariance_from(products: Array) -> np.ndarray:
     """Covariance of the free coordinates; directions without information get a large finite variance."""
     own, _, scale = normal(products, list(range(len(products) - 1)), ridge=0.0)
     values, vectors = np.linalg.eigh(own)

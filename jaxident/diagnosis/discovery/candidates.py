@@ -13,15 +13,14 @@ from jaxident.diagnosis.causes.refit import Solution
 from jaxident.diagnosis.motion.linear import motion_of
 from jaxident.diagnosis.motion.responses import Responses
 from jaxident.diagnosis.motion.windows import Windows
-from jaxident.effects.discovered import ACTS, BY_CAMERA, Laws
+from jaxident.effects.discovered import AHEAD, ALONG, BY_CAMERA, HEADING, LEFT, SIDEWAYS, TURN, WHEELS, Laws
 
 KNOTS = 10
 """Of a curve. No other number was tried."""
 INSIDE = (0.01, 0.99)
-"""Quantiles of a signal between which its knots lie."""
+"""Quantiles of a signal between which its knots lie. No others were tried."""
 VARIED = 1e-6
-"""A signal that spans less than this tells no curve."""
-ALONG, HEADING, SIDEWAYS, WHEELS, AHEAD, LEFT, TURN = ACTS
+"""A signal that spans less than this, in its own unit, tells no curve. No other value was tried."""
 OF_FORCE = ("v", "w", "heading", "x", "y", "time", "push right", "push left")
 SITE_OF_SIGNAL = {
     "v": "drive", "w": "drive", "heading": "contact", "x": "contact", "y": "contact", "time": "time",

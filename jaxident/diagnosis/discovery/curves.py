@@ -13,12 +13,13 @@ import numpy as np
 from jaxident.array_types import Array
 
 FLAT = 1e-3
-"""Precision of a straight line in parts of that of a kink: nearly flat. No other value was tried."""
+"""Precision of the values themselves over that of their second differences: straight lines are nearly free. No other
+value was tried."""
 SIZES = np.geomspace(1e-8, 1e8, 65)
-"""s^2 tried, in units of what one knot's information says."""
+"""Variances s^2 that are tried, in units of the mean variance of a knot's value without a prior."""
 FOLDS = 4
-"""Groups of windows, every fourth in one, of which each is left out once. Groups of neighbours do not do: a place where
-the robot has been once only would be told from straight lines that go on from elsewhere."""
+"""Groups of windows, every fourth in one, of which each is left out once. Neighbours in one
+group do not do: where the robot has been once only, the curve left out would have to go on straight from elsewhere."""
 
 
 class Bent(NamedTuple):

@@ -6,28 +6,27 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.alike import unlikeliness, with_prior
-from jaxident.diagnosis.causes.refit import Data, Solution, best_starts, covariance_of
+from jaxident.diagnosis.causes.refit import Data, Solution, best_starts, covariance_from
 from jaxident.diagnosis.discovery.candidates import Kind, columns_of, path_of
 from jaxident.diagnosis.discovery.curves import precision, solved
 from jaxident.diagnosis.motion.linear import Gram, Linear, gram, linearise
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.noise.law import Law
 from jaxident.effects.coordinates import limits
-from jaxident.effects.discovered import Laws, laws_of
+from jaxident.effects.discovered import Laws, laws_of, scaled
 from jaxident.robot.model import Discovered
 
 MOST_STEPS = 10
-"""Of one fit; on simulated robots two to five were taken."""
+"""Of one fit. No other number was tried."""
 ENOUGH = 0.05
-"""Fall of -log p below which a fit has arrived."""
+"""Fall of -log p below which a fit has arrived, as in `causes.refit`."""
 SHORTER = (1.0, 0.5, 0.2, 0.05)
-"""Parts of a step that are tried."""
+"""Parts of a step that are tried, one after the other. No others were tried."""
 
 
 class Curve(NamedTuple):
     """A discovered law for commands over their largest: knots, values there and their deviations (knots,), the variance
-    of its roughness prior, how many rows lie nearest to each knot, and what it brought when it was chosen: its log
-    evidence, and the fall of -log p on windows left out."""
+    of its roughness prior, and how many rows lie nearest to each knot."""
 
     kind: Kind
     at: Any
@@ -35,8 +34,6 @@ class Curve(NamedTuple):
     deviation: Any
     variance: float
     density: Any
-    evidence: float
-    held_out: float
 
 
 class Bending(NamedTuple):
@@ -63,10 +60,7 @@ def laws_from(curves: tuple[Curve, ...]) -> Laws | None:
 
 def as_law(curve: Curve, largest: float = 1.0) -> Discovered:
     """A curve as a model holds it, in the user's unit."""
-    kind = curve.kind
-    up = largest if kind.acts_on == "push of each wheel" else 1.0
-    along = largest if kind.signal.startswith(("push", "own")) else 1.0
-    return Discovered(*kind, along * curve.at, up * curve.value, up * curve.deviation)
+    return scaled(Discovered(*curve.kind, curve.at, curve.value, curve.deviation), largest)
 
 
 def curve_columns(fit: Solution, data: Data, curves: tuple[Curve, ...]) -> np.ndarray:
@@ -141,7 +135,7 @@ def _moved(data: Data, now: Solution, curves, around: _Around, step: Array, boun
 def _arrived(fit: Solution, curves: tuple[Curve, ...], around: _Around) -> tuple[Solution, tuple[Curve, ...]]:
     """The fit and its curves with their covariance and deviations."""
     own = len(fit.places)
-    covariance = covariance_of(around.summed)
+    covariance = covariance_from(around.summed)
     spread = np.sqrt(np.maximum(np.diagonal(covariance)[own:], 0.0))
     pieces = np.split(spread, np.cumsum([len(curve.at) for curve in curves])[:-1])
     found = tuple(curve._replace(deviation=part) for curve, part in zip(curves, pieces, strict=True))

@@ -6,8 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.discovery.candidates import ALONG, HEADING
-from jaxident.diagnosis.discovery.fit import Curve
+from jaxident.effects.discovered import ALONG, HEADING
 from jaxident.robot.model import Discovered
 
 LIKE = 0.8
@@ -51,15 +50,14 @@ class Form(NamedTuple):
     part_explained: float
 
 
-def form_of(curve: Curve, law: Discovered) -> Form | None:
-    """The form that explains most of a law, which is the curve in the user's unit; the simplest one where two explain
-    as much; None below LIKE.
+def form_of(law: Discovered, density: Sequence[int]) -> Form | None:
+    """The form that explains most of a law, the simplest one where two explain as much; None below LIKE.
 
-    What the nominal robot has already (`_own`) is free: a rate takes up the straight line in a drag, and a curve tells
-    only what is beyond it.
+    density (knots,): rows that lie nearest to each knot. What the nominal robot has itself (`_own`) is free: a rate
+    may take up the straight line in a drag, and the form is that of the rest.
     """
     s, value = np.asarray(law.at), np.asarray(law.value)
-    weight = np.maximum(np.asarray(curve.density, float), 1e-9)
+    weight = np.maximum(np.asarray(density, float), 1e-9)
     tried: list[tuple[str, dict[str, float], np.ndarray]] = []
     tried += [
         (name, {}, shape(s, s)) for name, shape in SHAPES.items() if name not in ANGLES or law.signal == "heading"

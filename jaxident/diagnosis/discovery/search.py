@@ -4,15 +4,13 @@ What a curve is worth is the smaller of its log evidence, less the price of havi
 brings to stretches that it was not fitted to. The runs kept for judging have no part in this.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.alike import with_prior
 from jaxident.diagnosis.causes.finding import Finding
 from jaxident.diagnosis.causes.refit import Data, Solution
-from jaxident.diagnosis.causes.rounds import LIKELY, SURE
+from jaxident.diagnosis.causes.rounds import LIKELY, SURE, whiten
 from jaxident.diagnosis.discovery.candidates import KINDS, KNOTS, candidates, path_of
 from jaxident.diagnosis.discovery.curves import Bent, bend
 from jaxident.diagnosis.discovery.fit import (
@@ -26,7 +24,6 @@ from jaxident.diagnosis.discovery.fit import (
 from jaxident.diagnosis.motion.linear import without_starts
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.motion.windows import Windows
-from jaxident.diagnosis.noise.law import Law, whitener_of
 from jaxident.diagnosis.noise.sizing import size_noise
 from jaxident.effects.discovered import MOST_LAWS
 
@@ -36,48 +33,31 @@ FEWEST = 8
 """Windows that a curve needs: two for each stretch that is left out once."""
 
 
-class Standing(NamedTuple):
-    """Where a search stands: a fit, its curves, the noise law and the data under it."""
-
-    fit: Solution
-    curves: tuple[Curve, ...]
-    law: Law
-    data: Data
-
-
 def discover(finding: Finding) -> list[Bending]:
     """Fits with one curve, two and so on; none where nothing is worth it."""
-    if len(finding.data.windows.run) < FEWEST:
-        return []
-    now = _stands(finding.data.windows, finding.fit, (), finding.law)
+    windows = finding.data.windows
+    now = Bending(finding.fit, (), finding.law)
     found: list[Bending] = []
-    while len(found) < MOST_LAWS:
-        more = _next(now)
+    while len(windows.run) >= FEWEST and len(found) < MOST_LAWS:
+        more = _next(windows, now)
         if more is None:
             break
         now = more
-        found.append(Bending(now.fit, now.curves, now.law))
+        found.append(now)
     return found
 
 
-def _next(now: Standing) -> Standing | None:
-    """One curve more, the noise sized again beside it, for a law sized beside a gap takes the gap for slip; None if
-    none is worth it."""
-    windows = now.data.windows
-    curve = strongest(now.data, now.fit, now.curves)
+def _next(windows: Windows, now: Bending) -> Bending | None:
+    """One curve more; None if none is worth it. The noise is sized again beside it: a law sized beside a gap takes the
+    gap for slip."""
+    data, _ = whiten(now.fit, windows, now.law)
+    curve = strongest(data, now.fit, now.curves)
     if curve is None:
         return None
-    fit, curves = refit_with(now.data, now.fit, (*now.curves, curve))
+    fit, curves = refit_with(data, now.fit, (*now.curves, curve))
     responses = respond(np.exp(fit.vector[:2]), fit.linear.residual, windows)
     law = size_noise(fit.linear.residual, fit.linear.starts, windows, responses, LIKELY)
-    there = _stands(windows, fit, curves, law)
-    fit, curves = refit_with(there.data, fit, curves)
-    return there._replace(fit=fit, curves=curves)
-
-
-def _stands(windows: Windows, fit: Solution, curves: tuple[Curve, ...], law: Law) -> Standing:
-    responses = respond(np.exp(fit.vector[:2]), fit.linear.residual, windows)
-    return Standing(fit, curves, law, Data(windows, whitener_of(law, windows, responses)))
+    return Bending(*refit_with(whiten(fit, windows, law)[0], fit, curves), law)
 
 
 def strongest(data: Data, fit: Solution, curves: tuple[Curve, ...]) -> Curve | None:
@@ -92,8 +72,7 @@ def strongest(data: Data, fit: Solution, curves: tuple[Curve, ...]) -> Curve | N
         worth = min(bent.evidence - PRICE, bent.held_out)
         if worth > most:
             none = np.zeros(KNOTS)
-            most, best = worth, Curve(each.kind, each.at, none, none, bent.variance, each.density,
-                                      bent.evidence - PRICE, bent.held_out)  # fmt: skip
+            most, best = worth, Curve(each.kind, each.at, none, none, bent.variance, each.density)
     return best
 
 
