@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from support.small_robot import LAW, VECTOR, nominal_fit, robot_with, windows_of
 
-from jaxident.diagnosis.causes.columns import AMPLITUDE, tabulate
+from jaxident.diagnosis.causes.columns import AMPLITUDE, FAR, _answers, _Column, tabulate
 from jaxident.diagnosis.causes.evidence import log_evidence, posterior_mean
 from jaxident.diagnosis.causes.moves import fit_options, stands
-from jaxident.diagnosis.causes.points import points_of, seeded, sizes_of
+from jaxident.diagnosis.causes.points import differences, points_of, seeded, sizes_of
 from jaxident.diagnosis.causes.refit import Data, refit
 from jaxident.diagnosis.motion.linear import follow, linearise
 from jaxident.diagnosis.noise.law import white_whitener
@@ -249,3 +249,18 @@ def test_louder_noise_says_less(plain):
     loud = tabulate(Data(data.windows, white_whitener(law, data.windows)), nominal, ())
     np.testing.assert_allclose(loud.products.sum(axis=0).diagonal(), 0.25 * table.products.sum(axis=0).diagonal(),
                                rtol=1e-6)  # fmt: skip
+
+
+def test_a_point_at_which_the_robot_runs_away_answers_nothing(plain):
+    """A mass offset of the wrong sign turns a fast robot ever faster. It was 1e10 m off, and left no table."""
+    data, nominal, _ = plain
+    away = seeded(nominal.vector, "mass_offset", {"along": 0.4, "heading": 40.0})
+    away[PLACES["mass_offset", "heading"]] *= -np.sign(nominal.vector[2])
+    away[2:6] *= 30.0
+    near = seeded(nominal.vector, "turn_loss", {"loss": 0.2})
+    answers = differences(data, nominal, [away, near])
+    assert np.nanmax(np.abs(answers[..., 0])) > FAR
+    columns = [_Column(AMPLITUDE, True, vector=vector) for vector in (away, near)]
+    kept = _answers(data, nominal, columns)[0]
+    assert not kept[..., 0].any()
+    np.testing.assert_array_equal(kept[..., 1], answers[..., 1])

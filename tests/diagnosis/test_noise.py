@@ -7,7 +7,8 @@ from support.arcs import along_arcs
 from jaxident.diagnosis.motion.responses import answer_to_start, respond
 from jaxident.diagnosis.noise.doubt import MEMORIES, doubt_of, draw_laws, sizes_by_memory
 from jaxident.diagnosis.noise.law import Law, covariance, first_law, slip_parts, white_whitener, whitener_of
-from jaxident.diagnosis.noise.sizing import sample, size_noise, size_one, steady_gain
+from jaxident.diagnosis.noise.likelihood import sample
+from jaxident.diagnosis.noise.sizing import size_noise, size_one, steady_gain
 
 ROWS, COUNT = 45, 60
 RATES = np.array([4.0, 5.0])
@@ -121,8 +122,7 @@ def test_a_memory_is_the_cameras_where_most_windows_show_it(made, share, size, c
 def test_wheels_that_slide_sideways_at_random_are_no_memory_of_the_camera(made):
     """Four draws, the memory in all windows: what tells it from a camera's is its direction."""
     windows, responses, starts = made
-    numbers = np.tile(np.arange(3 * ROWS), (COUNT, 1))
-    (sideways,) = slip_parts((responses.left,), 0.2, windows, numbers)
+    (sideways,) = slip_parts((responses.left,), 0.2, windows)
     slip = Law(5e-4, 4e-3, slip=(0.03, 0.35), slip_time=0.2)
     factor = np.linalg.cholesky(covariance(slip, windows, responses) + 0.01**2 * sideways)
     for seed in range(4):

@@ -12,7 +12,7 @@ from jaxident.diagnosis.discovery.fit import Bending, as_law
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.noise.doubt import Draws, draw_laws, sizes_by_memory
 from jaxident.diagnosis.noise.law import Law, less_slip
-from jaxident.diagnosis.noise.sizing import Sized, sample
+from jaxident.diagnosis.noise.likelihood import Amounts, Sized, sample
 from jaxident.diagnosis.prepare import Prepared
 
 REPLAYS = 500
@@ -52,6 +52,6 @@ def _laws(finding: Finding, seed: int) -> tuple[Law, Draws]:
     fitted = respond(np.exp(best.vector[:2]), best.linear.residual, windows)
     given = sample(best.linear.residual, best.linear.starts, windows, fitted)
     unknown = finding.unexplained > UNEXPLAINED
-    sizes = [Sized(finding.law, 0.0)] if unknown else sizes_by_memory(finding.likely, given)
+    sizes = [Sized(finding.law, 0.0, Amounts(()))] if unknown else sizes_by_memory(finding.likely, given)
     likeliest = max(sizes, key=lambda sized: sized.log_likelihood).law
     return likeliest, draw_laws(sizes, given, REPLAYS, seed)

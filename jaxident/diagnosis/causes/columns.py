@@ -33,6 +33,9 @@ from jaxident.effects.coordinates import (
 AMPLITUDE = 1.5
 """Prior standard deviation of the multiple of a grid's point that an effect is. Grids have steps of a factor of two or
 less. No other value was tried."""
+FAR = 1e4
+"""Answer in poses [m, rad] to one prior deviation from which on a robot runs away. Windows last seconds; beside the
+mass offset of one Create, other effects answered with 1e10 to 1e125."""
 NEUTRAL = neutral_vector(np.zeros(len(NOMINAL)))
 LOW, _ = limits()
 
@@ -49,7 +52,8 @@ class Option(NamedTuple):
 
 class Table(NamedTuple):
     """options; here: place of the option of each effect that the fit has. products (windows, n, n) and cross
-    (windows, n): whitened products of columns among each other, and with the residual of a robot without effects.
+    (windows, n): whitened products of columns among each other, and with the residual of a robot without effects;
+    whole (n, n) and right (n,): their sums over windows.
     scale (n,): prior standard deviation of what a column is multiplied with, which is zero without the effect;
     positive (n,): whether it is above zero."""
 
@@ -57,6 +61,8 @@ class Table(NamedTuple):
     here: dict[str, int]
     products: Any
     cross: Any
+    whole: Any
+    right: Any
     scale: Any
     positive: Any
 
@@ -99,7 +105,8 @@ def tabulate(
     products, cross = _eliminated(fit, products[:, :-1, :-1], cross, base.shape[2] if free else len(NOMINAL))
     if not free:
         products, cross = _without_rest(products, cross, scale)
-    return Table(options, here, products, cross, scale, np.array([column.positive for column in columns]))
+    positive = np.array([column.positive for column in columns])
+    return Table(options, here, products, cross, products.sum(axis=0), cross.sum(axis=0), scale, positive)
 
 
 def _ways(data: Data, fit: Solution, name: str, active: bool) -> list[tuple[Any, float, list[_Column]]]:
@@ -148,7 +155,9 @@ def _answers(data: Data, fit: Solution, columns: list[_Column]) -> tuple[np.ndar
     slopes, jumps = iter(np.moveaxis(linear.slopes[..., len(NOMINAL) :], -1, 0)), iter(np.moveaxis(change, -1, 0))
     own = [column.sign * next(jumps if column.place is None else slopes) for column in columns]
     answers = np.stack(own, axis=-1)
-    return np.where(np.isfinite(answers), answers, 0.0), linear  # a robot that runs away answers nothing
+    with np.errstate(over="ignore", invalid="ignore"):
+        largest = np.max(np.abs(answers), axis=(0, 1), initial=0.0) * [column.scale for column in columns]
+    return np.where(largest < FAR, answers, 0.0), linear  # a robot that runs away answers nothing
 
 
 def _eliminated(fit: Solution, products: Array, cross: Array, count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -57,8 +57,8 @@ def _posterior(table: Table, chosen: Sequence[int]) -> _Posterior:
     A Create's turn loss is twenty deviations of the catalogue's, which would cost 200 units of log evidence.
     """
     columns = [column for k in chosen for column in table.options[k].columns]
-    whole = np.einsum("wij->ij", table.products[:, columns][:, :, columns])
-    right, scale, positive = table.cross[:, columns].sum(axis=0), table.scale[columns], table.positive[columns]
+    whole, right = table.whole[np.ix_(columns, columns)], table.right[columns]
+    scale, positive = table.scale[columns], table.positive[columns]
     _, mean, free = _positive_mean(whole, right, scale, np.arange(len(columns)), positive)
     scale[free] *= np.maximum(1.0, np.abs(mean))
     precision, mean, free = _positive_mean(whole, right, scale, free, positive)

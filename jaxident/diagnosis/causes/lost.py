@@ -130,7 +130,8 @@ def _whitened(data: Data, solution: Solution, window: Array, row: Array, before:
     white, _ = without_starts(data.whitener, columns, linear.starts)
     rows = responses.along.shape[2]
     now = windows.command[windows.first[window] + row, windows.run[window]]
-    force = (past_zone(before, solution) - past_zone(now, solution)) @ solution.vector[2:6].reshape(2, 2).T
+    zone, gain = solution.vector[6:8], solution.vector[2:6].reshape(2, 2)
+    force = (past_zone(before, zone) - past_zone(now, zone)) @ gain.T
     parts = []
     for k in range(LATEST):
         place, within = np.minimum(row + k, rows - 1), (row + k < rows)[:, None]

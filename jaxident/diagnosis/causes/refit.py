@@ -91,9 +91,10 @@ def best_starts(
     """Starts (5, windows) moved in every window by the part of what is asked for (5, windows) that fits best, and half
     the squares: one window that shows little of its start must not stop the others."""
     lanes = starts + np.array(PARTS)[:, None, None] * moved
-    residual = follow(np.tile(vector, (len(lanes), 1)), lanes, data.windows, laws)
+    found = follow(np.tile(vector, (len(lanes), 1)), lanes, data.windows, laws)
+    residual = np.ascontiguousarray(np.moveaxis(found, 0, -1))  # the whitener is read once for all of them
     with np.errstate(over="ignore", invalid="ignore"):  # a start may run away
-        squares = 0.5 * np.sum((data.whitener @ residual[..., None])[..., 0] ** 2, axis=2)
+        squares = 0.5 * np.sum((data.whitener @ residual) ** 2, axis=1).T
     squares = np.where(np.isnan(squares), np.inf, squares)
     best = np.argmin(squares, axis=0)
     chosen = np.take_along_axis(lanes, best[None, None], axis=0)[0]

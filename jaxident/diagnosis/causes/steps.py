@@ -16,12 +16,16 @@ TEETH = np.arange(2.2, 50.0, 0.08)
 
 def likely_steps(data: Data, solution: Solution, count: int = 16) -> np.ndarray:
     """The most promising steps (count,), each better than its neighbours, in largest commands."""
-    wanted, command = _slopes(data, solution), data.windows.command
-    past = past_zone(command, solution)
-    promise = np.empty(len(TEETH))
-    for k, step in enumerate(1.0 / TEETH):
-        change = past_zone(np.round(command / step) * step, solution) - past
-        promise[k] = np.sum(wanted * change) / np.sqrt(np.sum(change**2) + 1e-12)
+    wanted = _slopes(data, solution)
+    slope, square = np.zeros(len(TEETH)), np.zeros(len(TEETH))
+    for wheel, zone in enumerate(solution.vector[6:8]):
+        levels, own, rows = np.unique(data.windows.command[..., wheel], return_inverse=True, return_counts=True)
+        by_level = np.bincount(own.ravel(), wanted[..., wheel].ravel(), len(levels))
+        for k, step in enumerate(1.0 / TEETH):
+            change = past_zone(np.round(levels / step) * step, zone) - past_zone(levels, zone)
+            slope[k] += by_level @ change
+            square[k] += rows @ change**2
+    promise = slope / np.sqrt(square + 1e-12)
     inside = np.pad(promise, 1, constant_values=-np.inf)
     peaks = np.flatnonzero((promise >= inside[:-2]) & (promise >= inside[2:]))
     return 1.0 / TEETH[peaks[np.argsort(-promise[peaks])][:count]]
@@ -40,9 +44,9 @@ def _slopes(data: Data, solution: Solution) -> np.ndarray:
     return total
 
 
-def past_zone(command: Array, solution: Solution) -> np.ndarray:
-    """What of commands (..., 2) lies beyond a solution's dead zones."""
-    return np.sign(command) * np.maximum(np.abs(command) - solution.vector[6:8], 0.0)
+def past_zone(command: Array, zone: Array) -> np.ndarray:
+    """What of commands (..., 2), or of those of one wheel, lies beyond its dead zone."""
+    return np.sign(command) * np.maximum(np.abs(command) - zone, 0.0)
 
 
 def pulls(data: Data, residual: Array, responses: Responses) -> tuple[np.ndarray, np.ndarray]:

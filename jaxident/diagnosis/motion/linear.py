@@ -101,7 +101,8 @@ def gram(whitener: Array, columns: Array, starts: Array) -> Gram:
 
 def without_starts(whitener: Array, columns: Array, starts: Array) -> tuple[np.ndarray, np.ndarray]:
     """Whitened columns (windows, numbers, n) free of start states, and what these take of them (windows, 5, n)."""
-    columns, starts = whitener @ columns, whitener @ starts
+    whitened = whitener @ np.concatenate([columns, starts], axis=2)  # the whitener is read once
+    columns, starts = whitened[..., :-START_STATES], whitened[..., -START_STATES:]
     scale = np.sqrt(np.sum(starts**2, axis=1, keepdims=True)) + 1e-300
     basis, upper = np.linalg.qr(starts / scale)
     upper = upper + 1e-9 * np.eye(START_STATES)

@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.noise.law import Law, of_unseen, parts_of, variances_of
-from jaxident.diagnosis.noise.sizing import Sample, Sized, likelihood, size_one
+from jaxident.diagnosis.noise.law import Law, variances_of
+from jaxident.diagnosis.noise.likelihood import Amounts, Sample, Sized, amounts_of, likeliest, likelihood, structure_of
+from jaxident.diagnosis.noise.sizing import size_one
 
 MEMORIES = tuple(np.geomspace(0.025, 1.6, 11).tolist())
 """Correlation times of slip [s] that are looked at, a factor of 1.5 apart."""
@@ -37,9 +38,10 @@ class Draws(NamedTuple):
 def sizes_by_memory(law: Law, given: Sample) -> list[Sized]:
     """The law sized again for each memory of slip; itself alone without slip."""
     if law.slip is None:
-        return [Sized(law, 0.0)]
-    rival = size_one(given, law, law.slip_time, law.coloured_time).log_likelihood + np.log(SMALLEST)
-    return [size_one(given, law, time, law.coloured_time, rival) for time in MEMORIES]
+        return [Sized(law, 0.0, Amounts(()))]
+    own = size_one(given, law, law.slip_time, law.coloured_time)
+    rival = own.log_likelihood + np.log(SMALLEST)
+    return [likeliest(given, structure_of(given, time, law.coloured_time), own.amounts, rival) for time in MEMORIES]
 
 
 def draw_laws(sizes: list[Sized], given: Sample, count: int, seed: int = 0) -> Draws:
@@ -61,7 +63,7 @@ def draw_laws(sizes: list[Sized], given: Sample, count: int, seed: int = 0) -> D
 def doubt_of(law: Law, given: Sample) -> np.ndarray:
     """Covariance (variances, variances) of the logarithms of a law's variances, by average information; no variance is
     known worse than by a factor of about e."""
-    parts = parts_of(law.slip_time, law.coloured_time, given.windows, given.responses, given.numbers)
-    theta = variances_of(law)
-    curve = likelihood(given.residual, given.starts, parts, theta, of_unseen(given.windows, given.numbers))[2]
-    return np.linalg.inv(theta[:, None] * curve * theta + np.eye(len(theta)))
+    structure = structure_of(given, law.slip_time, law.coloured_time)
+    amounts = np.concatenate(amounts_of(law, structure))
+    curve = likelihood(given, structure.parts, amounts)[2]
+    return np.linalg.inv(amounts[:, None] * curve * amounts + np.eye(len(amounts)))

@@ -1,6 +1,7 @@
 """What is random: the camera's error, white or with a memory, and slip of the wheels; and the covariance that it gives
 the poses of a window, which is linear in the variances. NumPy, windows first."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -79,30 +80,46 @@ def variances_of(law: Law) -> np.ndarray:
 
 def parts_of(slip_time, coloured_time, windows: Windows, responses: Responses, numbers: Array) -> list[np.ndarray]:
     """What each variance multiplies (windows, n, n), for some numbers (windows, n)."""
-    seen = numbers_of(numbers_seen(windows), numbers)
-    both = seen[:, :, None] * seen[:, None, :]
-    of_position, of_heading = (numbers % 3 < 2)[:, None], (numbers % 3 == 2)[:, None]
-    parts = [both * np.eye(numbers.shape[1]) * wanted for wanted in (of_position, of_heading)]
-    step = np.asarray(windows.step).T
-    time = np.cumsum(step, axis=1) - step
+    parts = camera_parts(windows, numbers)
     if slip_time is not None:
-        parts += slip_parts((responses.along, responses.heading), slip_time, windows, numbers)
+        answers = [answers_of(each, windows, numbers) for each in (responses.along, responses.heading)]
+        parts += slip_parts(answers, slip_time, windows)
     if coloured_time is not None:
-        own = numbers_of(time, numbers // 3)
-        memory = np.exp(-np.abs(own[:, :, None] - own[:, None, :]) / coloured_time)
-        same = (numbers % 3)[:, :, None] == (numbers % 3)[:, None]
-        parts += [both * memory * (same & wanted) for wanted in (of_position, of_heading)]
+        parts += memory_parts(coloured_time, windows, numbers)
     return parts
 
 
-def slip_parts(answers: tuple[Array, ...], slip_time: float, windows: Windows, numbers: Array) -> list[np.ndarray]:
-    """What the variance of each kind of slip, by what the poses answer to it, multiplies (windows, n, n)."""
+def camera_parts(windows: Windows, numbers: Array) -> list[np.ndarray]:
+    """What the variances of white camera errors in position and heading multiply (windows, n, n)."""
     seen = numbers_of(numbers_seen(windows), numbers)
-    step = np.asarray(windows.step).T
-    time = np.cumsum(step, axis=1) - step
+    return [(seen * of)[:, :, None] * np.eye(numbers.shape[1]) for of in (numbers % 3 < 2, numbers % 3 == 2)]
+
+
+def slip_parts(answers: Sequence[Array], slip_time: float, windows: Windows) -> list[np.ndarray]:
+    """What the variance of each kind of slip, by what numbers answer to it (windows, n, rows), multiplies (windows, n,
+    n)."""
+    time = _times(windows)
     memory = np.exp(-np.abs(time[:, :, None] - time[:, None, :]) / slip_time)
-    own = (seen[:, :, None] * numbers_of(answer, numbers) for answer in answers)
-    return [one @ memory @ one.transpose(0, 2, 1) for one in own]
+    return [one @ memory @ one.transpose(0, 2, 1) for one in answers]
+
+
+def memory_parts(coloured_time: float, windows: Windows, numbers: Array) -> list[np.ndarray]:
+    """What the variances of camera errors with a memory in position and heading multiply (windows, n, n)."""
+    seen, own = numbers_of(numbers_seen(windows), numbers), numbers_of(_times(windows), numbers // 3)
+    memory = np.exp(-np.abs(own[:, :, None] - own[:, None, :]) / coloured_time)
+    memory *= seen[:, :, None] * seen[:, None, :] * ((numbers % 3)[:, :, None] == (numbers % 3)[:, None])
+    return [memory * of[:, :, None] for of in (numbers % 3 < 2, numbers % 3 == 2)]
+
+
+def answers_of(answer: Array, windows: Windows, numbers: Array) -> np.ndarray:
+    """What some numbers (windows, n) answer to each row (windows, n, rows), 0 where unseen."""
+    return numbers_of(numbers_seen(windows), numbers)[:, :, None] * numbers_of(answer, numbers)
+
+
+def _times(windows: Windows) -> np.ndarray:
+    """Time of each row since its window's first (windows, rows) [s]."""
+    step = np.asarray(windows.step).T
+    return np.cumsum(step, axis=1) - step
 
 
 def numbers_seen(windows: Windows) -> np.ndarray:
