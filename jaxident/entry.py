@@ -5,6 +5,7 @@ import inspect
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+from jaxident import results
 from jaxident.diagnosis import diagnose as diagnosing
 from jaxident.effects import simulate as simulating
 from jaxident.estimation import bootstrap as resampling
@@ -16,8 +17,9 @@ from jaxident.files.any_log import as_log, as_logs
 Function = TypeVar("Function", bound=Callable)
 
 
-def taking(function: Function, **readers: Callable[[Any], Any]) -> Function:
-    """The function, some of its arguments read first by `readers`; None stays None."""
+def taking(function: Function, then: Callable[..., Any] | None = None, **readers: Callable[[Any], Any]) -> Function:
+    """The function, some of its arguments read first by `readers`; None stays None. `then` makes a result of what it
+    returns and of these arguments."""
     signature = inspect.signature(function)
 
     @functools.wraps(function)
@@ -26,14 +28,15 @@ def taking(function: Function, **readers: Callable[[Any], Any]) -> Function:
         for name, read in readers.items():
             if bound.arguments.get(name) is not None:
                 bound.arguments[name] = read(bound.arguments[name])
-        return function(*bound.args, **bound.kwargs)
+        found = function(*bound.args, **bound.kwargs)
+        return found if then is None else then(found, *(bound.arguments.get(name) for name in readers))
 
     return call  # type: ignore[return-value]
 
 
-identify = taking(identifying.identify, logs=as_logs)
-diagnose = taking(diagnosing.diagnose, logs=as_logs, sim=as_logs)
+identify = taking(identifying.identify, results.identified, logs=as_logs)
+diagnose = taking(diagnosing.diagnose, results.diagnosed, logs=as_logs, sim=as_logs)
 bootstrap = taking(resampling.bootstrap, logs=as_logs)
-predict = taking(predicting.predict, log=as_log)
+predict = taking(predicting.predict, results.predicted, log=as_log)
 simulate = taking(simulating.simulate, log=as_log)
 cramer_rao = taking(precision.cramer_rao, inputs=as_logs)

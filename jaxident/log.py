@@ -85,6 +85,20 @@ class Log(NamedTuple):
         """The rows with first <= t <= last [s]; None leaves a side open. InputError where none is left."""
         return between(self, first, last)
 
+    def __repr__(self) -> str:
+        """One line; of columns that JAX traces, their shapes."""
+        if not isinstance(self.t, np.ndarray) or self.t.ndim != 1 or not len(self.t):
+            return f"Log({', '.join(f'{name}={np.shape(column)}' for name, column in self._asdict().items())})"
+        runs, seen = self.runs(), np.isfinite(np.asarray(self.x, float)).mean()
+        seconds = sum(float(run.t[-1] - run.t[0]) for run in runs)
+        return f"Log of {len(self.t)} rows in {len(runs)} run(s), {seconds:.4g} s, poses in {100.0 * seen:.3g} % of them"
+
+    def to_dataframe(self) -> Any:
+        """The columns as a pandas data frame."""
+        import pandas
+
+        return pandas.DataFrame({name: np.asarray(column) for name, column in self._asdict().items()})
+
     def __getitem__(self, rows: Any) -> Any:  # type: ignore[override]
         """The rows of a slice, a mask (samples,) or an array of row numbers, as a log; of a number, that column."""
         if isinstance(rows, slice) or np.ndim(rows):

@@ -16,6 +16,7 @@ FLOORS = (
     ("estimation",),
     ("study", "diagnosis"),
     ("files", "plot", "report", "export"),
+    ("results",),
     ("entry",),
     ("",),  # the package's own file of public names
     ("cli",),

@@ -220,3 +220,16 @@ def test_times_as_dates_and_headings_as_quaternions():
 def test_a_wrong_column_or_unit_is_named(columns, reason):
     with pytest.raises(InputError, match=reason):
         Log.from_dataframe(RAW, columns)
+
+
+def test_a_log_is_shown_in_a_line_and_as_a_frame():
+    log = make_log(np.arange(4.0), np.ones(4), np.ones(4), np.array([0.0, np.nan, 1.0, 2.0]), np.zeros(4), np.zeros(4),
+                   np.array([0, 0, 1, 1]))  # fmt: skip
+    assert repr(log) == "Log of 4 rows in 2 run(s), 2 s, poses in 75 % of them"
+    assert repr(log[:0]) == "Log(t=(0,), u_r=(0,), u_l=(0,), x=(0,), y=(0,), theta=(0,), run=(0,))"
+    shown = []
+    jax.jit(lambda log: shown.append(repr(log)) or log.t)(log)
+    assert shown == ["Log(t=(4,), u_r=(4,), u_l=(4,), x=(4,), y=(4,), theta=(4,), run=(4,))"]
+    frame = log.to_dataframe()
+    assert list(frame.columns) == list(Log._fields)
+    np.testing.assert_array_equal(frame.x, log.x)

@@ -31,6 +31,7 @@ _HOMES = {
     "error_curves": "studies",
     "error_histogram": "studies",
     "figure": "style",
+    "legend_above": "style",
     "image": "output",
     "save": "output",
 }

@@ -1,23 +1,24 @@
 """The account of a diagnosis, for pages and terminals: who causes how many millimetres."""
 
+from typing import TYPE_CHECKING
+
 from jaxident import plot
-from jaxident.diagnosis.account.account import CAMERA, DISCOVERED, REST, SLIP, START, Account
+from jaxident.diagnosis.account.account import CAMERA, DISCOVERED, REST, SLIP, START, Account, Row
 from jaxident.report.page import Figure, Section, Table
 from jaxident.report.words import SPACE, angle, length, part, percent
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 BAR = 30
 """Characters of a bar of text that stand for the whole error."""
 NOISE = (CAMERA, START, SLIP)
 
 
-def account_section(account: Account) -> Section:
-    """The waterfall, and the same as a table."""
-    heading = "Who causes how much"
-    shown = [row for row in account.rows if row.part != DISCOVERED or row.share]
-    if not shown:
-        return Section(heading, ["No stretch of the logs is left to judge by."])
-    figure, ax = plot.figure(size=(6.3, 0.9 + 0.28 * len(shown)))
-    plot.waterfall(
+def draw_account(account: Account, ax: "Axes | None" = None) -> "Axes":
+    """The waterfall of an account, on some axes or on new ones."""
+    shown = _shown(account)
+    return plot.waterfall(
         {part(row.part): row.share for row in shown},
         {part(row.part): row.interval for row in shown},
         notes={part(row.part): f"{length(row.rms_position)}, {angle(row.rms_heading)}" for row in shown},
@@ -25,6 +26,21 @@ def account_section(account: Account) -> Section:
         rest=part(REST),
         ax=ax,
     )
+
+
+def _shown(account: Account) -> list[Row]:
+    """The rows of an account, without an empty one for what was discovered."""
+    return [row for row in account.rows if row.part != DISCOVERED or row.share]
+
+
+def account_section(account: Account) -> Section:
+    """The waterfall, and the same as a table."""
+    heading = "Who causes how much"
+    shown = _shown(account)
+    if not shown:
+        return Section(heading, ["No stretch of the logs is left to judge by."])
+    figure, ax = plot.figure(size=(6.3, 0.9 + 0.28 * len(shown)))
+    draw_account(account, ax)
     rows = [
         (part(row.part), length(row.rms_position), angle(row.rms_heading), percent(row.share),
          f"{percent(row.interval[0])} to {percent(row.interval[1])}")
@@ -61,7 +77,7 @@ def plain_text(text: str) -> str:
 
 def account_lines(account: Account) -> list[str]:
     """The account as lines of text with bars."""
-    shown = [row for row in account.rows if row.part != DISCOVERED or row.share]
+    shown = _shown(account)
     if not shown:
         return []
     names = [part(row.part) for row in shown]

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,8 +15,10 @@ from jaxident.estimation.runs import stack_runs
 from jaxident.estimation.verdict import BORROWED, Verdict
 from jaxident.files.atomic import Target
 from jaxident.log import Log, join
-from jaxident.plot.style import legend_above
 from jaxident.report.page import Figure, Page, Section, Table, write_page
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 def write_identification(
@@ -92,15 +95,20 @@ def _dead_zones(found: Identification) -> Figure:
 
 
 def _path(found: Identification, log: Log) -> Figure:
-    """Measured poses and the model's: measured minus residual."""
     figure, ax = plot.figure(size=(6.3, 4.6))
-    plot.path(log, ax=ax)
+    draw_fit(found, log, ax)
+    return Figure(plot.image(figure), "Path", "Measured poses and the model's, run by run from one start state each.")
+
+
+def draw_fit(found: Identification, log: Log, ax: "Axes | None" = None) -> "Axes":
+    """Measured poses and the model's, on some axes or on new ones: measured minus residual."""
+    ax = plot.path(log, ax=ax)
     for run in np.unique(np.asarray(log.run)):
         own = np.asarray(log.run) == run
         x, y = (np.asarray(c)[own] - r[own] for c, r in zip(log.pose[:2], found.residuals[:2], strict=True))
         ax.plot(x, y, color="#0072B2", linewidth=0.8, label="model" if run == np.ravel(log.run)[0] else None)
-    legend_above(ax)
-    return Figure(plot.image(figure), "Path", "Measured poses and the model's, run by run from one start state each.")
+    plot.legend_above(ax)
+    return ax
 
 
 def _pictures(found: Identification, log: Log, normalised: np.ndarray, seen: np.ndarray) -> list[Figure]:

@@ -80,6 +80,11 @@ def write_page(page: Page, path: Target) -> None:
     write_text(path, render(page))
 
 
+def fragment(blocks: Sequence["str | Table | Figure | Code"]) -> str:
+    """Paragraphs, tables and figures as HTML to stand in another page, such as a notebook's."""
+    return f"<div>{''.join(_block(block) for block in blocks)}</div>"
+
+
 def _section(section: Section) -> str:
     blocks = "".join(_block(block) for block in section.blocks)
     return f"<section>\n<h2>{escape(section.heading)}</h2>\n{blocks}</section>\n"

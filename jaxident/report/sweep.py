@@ -13,7 +13,6 @@ from jaxident.files.atomic import Target
 from jaxident.log import make_log
 from jaxident.plot.names import plain, written
 from jaxident.plot.studies import Curve
-from jaxident.plot.style import legend_above
 from jaxident.report.page import Figure, Page, Section, Table, write_page
 from jaxident.robot.model import DIFFERENCE_ORDER
 from jaxident.robot.path_length import path_length
@@ -211,7 +210,7 @@ def draw_trial(study: Study, number: int, recording: Recording, outcome: Outcome
     seen, true = (Increment(*(np.asarray(c)[:SHOWN_ROWS] for c in path_length(log.pose))) for log in (measured, exact))
     plot.increments(exact.t[1 : len(seen.turn) + 1], seen, true, ax=axes[2], channel="turn")
     axes[2].lines[1].set_label("without noise")
-    legend_above(axes[2])
+    plot.legend_above(axes[2])
     pairs = zip(outcome.estimate, outcome.deviation, strict=True)
     found = {plain(choice.name): pair for choice, pair in zip(study.estimators, pairs, strict=True)}
     plot.estimate_errors(found, truth=outcome.truth, names=DIFFERENCE_ORDER, ax=axes[3])
