@@ -225,7 +225,7 @@ def test_a_wrong_column_or_unit_is_named(columns, reason):
 def test_a_log_is_shown_in_a_line_and_as_a_frame():
     log = make_log(np.arange(4.0), np.ones(4), np.ones(4), np.array([0.0, np.nan, 1.0, 2.0]), np.zeros(4), np.zeros(4),
                    np.array([0, 0, 1, 1]))  # fmt: skip
-    assert repr(log) == "Log of 4 rows in 2 run(s), 2 s, poses in 75 % of them"
+    assert repr(log) == "Log of 4 rows in 2 run(s), 2 s, 75 % with a pose"
     assert repr(log[:0]) == "Log(t=(0,), u_r=(0,), u_l=(0,), x=(0,), y=(0,), theta=(0,), run=(0,))"
     shown = []
     jax.jit(lambda log: shown.append(repr(log)) or log.t)(log)

@@ -31,14 +31,23 @@ def less_slip(law: Law, factor: float) -> Law:
 
 
 def first_law(windows: Windows) -> Law:
-    """Camera error by fourth differences of the poses, which motion hardly enters; the median forgives switches."""
-    pose, seen = np.asarray(windows.pose), np.asarray(windows.seen)
-    whole = np.all([seen[k : len(seen) - 4 + k] for k in range(5)], axis=0)
+    """Camera error by fourth divided differences of successive poses, which motion hardly enters, however uneven their
+    times; the median forgives switches."""
+    pose, seen = np.nan_to_num(np.asarray(windows.pose)), np.asarray(windows.seen)
+    time = np.cumsum(windows.step, axis=0) - windows.step
+    order = np.argsort(~seen, axis=0, kind="stable")  # poses that were seen first, in their order
+    pose, time = np.take_along_axis(pose, order[..., None], axis=0), np.take_along_axis(time, order, axis=0)
+    pose[..., 2] = np.unwrap(pose[..., 2], axis=0)
+    count = len(seen) - 4
+    whole = np.arange(4, len(seen))[:, None] < seen.sum(axis=0)
+    stencil = np.stack([time[k : count + k] for k in range(5)])
+    apart = np.where(whole, stencil[:, None] - stencil, 1.0) + np.eye(5)[:, :, None, None]
+    weight = 1.0 / np.prod(apart, axis=1)
+    weight /= np.sqrt(np.sum(weight**2, axis=0))
     found: list[float] = []
     for k in range(3):
-        column = np.unwrap(pose[..., k], axis=0) if k == 2 else pose[..., k]
-        change = np.diff(column, n=4, axis=0)[whole]
-        found.append(float(np.median(np.abs(change))) / 0.6745 / np.sqrt(70.0) if change.size else 1e-3)
+        change = sum(weight[j] * pose[j : count + j, :, k] for j in range(5))[whole]
+        found.append(float(np.median(np.abs(change))) / 0.6745 if change.size else 1e-3)
     return Law(max(float(np.hypot(found[0], found[1])) / 2.0**0.5, 1e-7), max(found[2], 1e-7))
 
 
