@@ -24,7 +24,7 @@ MOST_REFITS = 100_000
 """Refits of a bootstrap; more than some thousands move an interval's ends by nothing."""
 NOTES = {
     "paper": "Intervals take the equation error for white. Camera noise makes it coloured and biases these estimates: "
-    "see the README, 'What the paper's method can and cannot do'.",
+    "see experiments/validation.md, 'Estimates and their intervals'.",
     "instrumental-variables": "Intervals take the filtered equation error for white. Camera noise makes path lengths "
     "longer than the path, which biases what is estimated from them.",
     "key-term-least-squares": "Intervals take the equation error for white. Camera noise makes it coloured and biases "

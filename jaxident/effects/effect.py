@@ -178,7 +178,7 @@ class Chance(NamedTuple):
 class EffectRecord(NamedTuple):
     """One effect of the catalogue.
 
-    words: in plain words, as they follow the name in a report. equation: with the symbols of README, primes for time
+    words: in plain words, as they follow the name in a report. equation: with the symbols of docs/how_it_works.md, primes for time
     derivatives. channels: those of along, lateral, heading in which it changes the movement from row to row, as the
     reported heading sees it. confused_with: effects that inputs separate badly. act, fast: its law (see above). rank:
     within a stage, the lower acts first; equal ones in the order of the catalogue.
