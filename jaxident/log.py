@@ -91,9 +91,7 @@ class Log(NamedTuple):
             return f"Log({', '.join(f'{name}={np.shape(column)}' for name, column in self._asdict().items())})"
         runs, seen = self.runs(), np.isfinite(np.asarray(self.x, float)).mean()
         seconds = sum(float(run.t[-1] - run.t[0]) for run in runs)
-        return (
-            f"Log of {len(self.t)} rows in {len(runs)} run(s), {seconds:.4g} s, {100.0 * seen:.3g} % with a pose"
-        )
+        return f"Log of {len(self.t)} rows in {len(runs)} run(s), {seconds:.4g} s, {100.0 * seen:.3g} % with a pose"
 
     def to_dataframe(self) -> Any:
         """The columns as a pandas data frame."""

@@ -178,17 +178,16 @@ class Chance(NamedTuple):
 class EffectRecord(NamedTuple):
     """One effect of the catalogue.
 
-    words: in plain words, as they follow the name in a report. equation: with the symbols of docs/how_it_works.md, primes for time
-    derivatives. channels: those of along, lateral, heading in which it changes the movement from row to row, as the
-    reported heading sees it. confused_with: effects that inputs separate badly. act, fast: its law (see above). rank:
-    within a stage, the lower acts first; equal ones in the order of the catalogue.
+    words: in plain words, as they follow the name in a report. equation: with the symbols of docs/how_it_works.md,
+    primes for time derivatives. channels: those of along, lateral, heading in which it changes the movement from row to
+    row, as the reported heading sees it. confused_with: effects that inputs separate badly. act, fast: its law (see
+    above). rank: within a stage, the lower acts first; equal ones in the order of the catalogue.
 
     smooth: whether the simulation has a derivative by the parameters at neutral; where not, `grid` holds values of the
     first parameter to try instead. sharp: it has corners within a sample. varies: it changes while the command is held.
-    timed: it goes by session time. extension: beyond the catalogue that this program was asked for.
-    step: its law as statements for programs without this package; None where it draws. quantity: what simulators and
-    controllers call it, where one of them has a word for it (`jaxident.export`).
-    Every record has `search` or `chance`.
+    timed: it goes by session time. extension: beyond the catalogue that this program was asked for. step: its law as
+    statements for programs without this package; None where it draws. quantity: what simulators and controllers call
+    it, where one of them has a word for it (`jaxident.export`). Every record has `search` or `chance`.
     """
 
     name: str
