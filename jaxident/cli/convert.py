@@ -3,6 +3,7 @@
 import click
 
 from jaxident.cli.progress import working
+from jaxident.cli.record import Recorded, origin, tell_origin
 from jaxident.cli.session import ColumnsOption, Number, above_zero, check_outputs, columns_option, table, warn, wrote
 
 NEEDED = "give --commands CSV --poses CSV, or --bag PATH"
@@ -36,7 +37,7 @@ class OrderOption(click.ParamType):
         return words
 
 
-@click.command()
+@click.command("convert", cls=Recorded)
 @click.option("--commands", metavar="CSV", help="Columns t,v,w or t,u_r,u_l.")
 @click.option("--poses", metavar="CSV", help="Columns t,x,y,theta or t,x,y,qx,qy,qz,qw.")
 @click.option("--bag", metavar="PATH", help="A ROS bag in place of both: .bag, .db3, .mcap or a ROS 2 folder.")
@@ -75,9 +76,12 @@ def command(commands, poses, bag, listing, out, period, track, pose_offset, hold
 
     from jaxident.estimation.suspicions import log_suspicions
     from jaxident.files.logs import write_log
+    from jaxident.files.origins import check_beside
     from jaxident.files.streams import merge
 
     check_outputs(out)
+    check_beside(out)
+    made = origin("--out")
     with working("converting"):
         given, seen, notes = _from_bag(bag, chosen) if bag else _from_files(commands, poses, chosen)
         offset, told = _estimate(given, seen, track) if pose_offset == "auto" else (pose_offset, ())
@@ -92,6 +96,7 @@ def command(commands, poses, bag, listing, out, period, track, pose_offset, hold
     measured = np.count_nonzero(np.isfinite(log.x))
     click.echo(f"{len(log.t)} rows, {measured} with a pose, {log.t[-1] - log.t[0]:.6g} s")
     wrote(out)
+    tell_origin(out, made)
 
 
 IN_SPEEDS = {

@@ -20,6 +20,7 @@ COMMANDS = {
     "identify": "The model behind one or several logs.",
     "predict": "Free-run prediction of a log by a model.",
     "diagnose": "The sim-to-real gap: where it lies, which effect causes it, how far it shrinks.",
+    "rerun": "Make a result again from what it says of itself, and compare.",
     "export": "The model in the words of a simulator, a controller or a program.",
     "plan": "The next input: the one that best separates two effects.",
     "sweep": "A Monte-Carlo study: statistics over seeds, excitations, noise levels, robots, estimators.",
