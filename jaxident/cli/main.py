@@ -16,7 +16,7 @@ COMMANDS = {
     "example": "Write small example logs of a simulated robot.",
     "simulate": "Synthetic logs from a model.",
     "effects": "The catalogue of what real robots do beyond the model.",
-    "convert": "Two streams, commands and poses, to one log.",
+    "convert": "Two streams, commands and poses, to one log; or a log to a better one.",
     "identify": "The model behind one or several logs.",
     "predict": "Free-run prediction of a log by a model.",
     "diagnose": "The sim-to-real gap: where it lies, which effect causes it, how far it shrinks.",
