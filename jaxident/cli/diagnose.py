@@ -82,7 +82,7 @@ def command(logs, columns, sim, model, horizon, out, seed):
         save_model(_with_origin(written, made._replace(output=name)), os.path.join(out, name))
         wrote(os.path.join(out, name))
     page = os.path.join(out, OUTPUTS[3])
-    write_page(diagnosis_page(found, ", ".join(map(_title, logs)), made), page)
+    write_page(diagnosis_page(found, _title(logs), made), page)
     wrote(page)
 
 
@@ -93,9 +93,12 @@ def _with_origin(model, made):
     return dataclasses.replace(model, provenance=with_origin(model.provenance, made))
 
 
-def _title(path: str) -> str:
-    """A log's or folder's name without what leads to it."""
-    return os.path.basename(os.path.normpath(path))
+def _title(logs) -> str:
+    """The name of the folder, or the names of the logs, without what leads to them."""
+    from jaxident.files.logs import find_logs
+
+    named = logs if len(logs) == 1 else find_logs(logs)
+    return ", ".join(os.path.basename(os.path.normpath(path)) for path in named)
 
 
 def _told(found) -> list[str]:
