@@ -28,17 +28,22 @@ class OffsetOption(Number):
             self.fail(f"{value!r} is neither a time in seconds nor auto", param, ctx)
 
 
-class OrderOption(click.ParamType):
-    """RIGHT,LEFT: indices or joint names."""
+class PairOption(click.ParamType):
+    """Two different words."""
 
-    name = "RIGHT,LEFT"
+    def __init__(self, name: str, wanted: str) -> None:
+        self.name, self.wanted = name, wanted
 
     def convert(self, value, param, ctx):
         """Both words."""
         words = tuple(word.strip() for word in value.split(",")) if isinstance(value, str) else value
         if len(words) != 2 or not all(words) or words[0] == words[1]:
-            self.fail(f"{value!r} should be two indices or joint names, the right wheel first, as in 1,0", param, ctx)
+            self.fail(f"{value!r} should be two {self.wanted}", param, ctx)
         return words
+
+
+ORDER = PairOption("RIGHT,LEFT", "indices or joint names, the right wheel first, as in 1,0")
+FRAMES = PairOption("FIXED,ROBOT", "frames, the robot's last, as in map,base_link")
 
 
 @click.command("convert", cls=Recorded)
@@ -53,7 +58,9 @@ class OrderOption(click.ParamType):
     "--pose-topic", metavar="T", help="PoseStamped, PoseWithCovarianceStamped, TransformStamped, tf, Odometry."
 )
 @click.option("--child-frame", metavar="F", help="Of a tf topic: the frame that moves with the robot.")
-@click.option("--wheel-order", type=OrderOption(), help="Which numbers or joints are the wheels, the right one first.")
+@click.option("--pose-frames", type=FRAMES, help="Compose tf from a fixed frame to the robot's, as in "
+              "map,base_link.")  # fmt: skip
+@click.option("--wheel-order", type=ORDER, help="Which numbers or joints are the wheels, the right one first.")
 @click.option("--bag-time", is_flag=True, help="Times of recording in place of the headers' stamps.")
 @columns_option
 @click.option("--command-columns", type=ColumnsOption(), default="", help="As --columns, for the commands alone.")
@@ -65,7 +72,7 @@ class OrderOption(click.ParamType):
 @click.option("--hold-timeout", type=above_zero, metavar="S", help="A command older than this counts as zero.")
 @click.option("--out", metavar="LOG", help="The log to write (.csv or .csv.gz).")
 def command(**chosen):
-    """Two streams, each with its own times, to one log; or a log to a better one. Never interpolates a pose.
+    """Two streams, each with its own times, to one log; or a log to a better one. A topic's pose is never interpolated.
 
     Example: jaxident convert --commands cmd.csv --poses mocap.csv --track 0.26 --period 0.05 --out log.csv
 
@@ -104,7 +111,7 @@ def command(**chosen):
 
 
 STREAMS_ALONE = ("track", "hold_timeout", "command_columns", "pose_columns", "command_topic", "pose_topic",
-                 "child_frame", "wheel_order", "bag_time")  # fmt: skip
+                 "child_frame", "pose_frames", "wheel_order", "bag_time")  # fmt: skip
 """Options that a finished log has no use for."""
 
 
@@ -114,6 +121,8 @@ def _check_sources(chosen) -> None:
     half = bool(chosen["commands"]) != bool(chosen["poses"])
     if half or streams + bool(chosen["bag"]) + bool(chosen["log"]) != 1:
         raise click.UsageError(NEEDED)
+    if chosen["child_frame"] and chosen["pose_frames"]:
+        raise click.UsageError("--pose-frames FIXED,ROBOT names the robot's frame; leave --child-frame out")
     if chosen["listing"] and not chosen["bag"]:
         raise click.UsageError("--list shows the topics of --bag PATH")
     foreign = next((name for name in STREAMS_ALONE if chosen["log"] and chosen[name]), None)
@@ -188,7 +197,7 @@ def _from_bag(chosen):
     from jaxident.files.bags import read_bag_streams
     from jaxident.files.messages import Choice
 
-    choice = Choice(chosen["child_frame"], chosen["wheel_order"], chosen["bag_time"])
+    choice = Choice(chosen["child_frame"], chosen["wheel_order"], chosen["bag_time"], chosen["pose_frames"])
     columns = chosen["columns"] | chosen["command_columns"] | chosen["pose_columns"]
     return read_bag_streams(chosen["bag"], chosen["command_topic"], chosen["pose_topic"], choice, columns)
 
