@@ -15,6 +15,8 @@ READ = ("logs", "log", "sim", "model", "inputs", "commands", "poses", "bag", "st
 """Names of the parameters that stand for files or folders which are read."""
 WRITTEN = ("out", "json_file", "report")
 """Names of those that stand for outputs: they are in no origin, or the same result in another folder would differ."""
+UNTOLD = (*WRITTEN, "scheduler")
+"""What no origin tells: outputs, and who computes, which changes no bit and may name a machine."""
 WORDS_KEY = "jaxident.words"
 
 
@@ -30,7 +32,7 @@ class Recorded(click.Command):
 def words_of(command: click.Command, ctx: click.Context, args: Sequence[str]) -> dict[str, list[str]]:
     """The words that each parameter was given, by its name; UsageError as click has it. A flag's word is empty."""
     given, left, _ = command.make_parser(ctx).parse_args(list(args))
-    if left:
+    if left and not ctx.resilient_parsing:
         raise click.UsageError(f"Got unexpected extra argument ({left[0]})", ctx)
     return {name: list(_words(value)) for name, value in given.items() if isinstance(name, str)}
 
@@ -56,7 +58,7 @@ def origin(output: str, **read: Sequence[str]) -> Any:
     for parameter in ctx.command.params:
         name = str(parameter.name)
         words = list(map(str, read[name])) if name in read else ctx.meta[WORDS_KEY].get(name, [])
-        if name in WRITTEN or not (words and (name in read or _differs(ctx, parameter))):
+        if name in UNTOLD or not (words and (name in read or _differs(ctx, parameter))):
             continue
         for word in words:
             known = name in READ and (word == "-" or os.path.exists(word))

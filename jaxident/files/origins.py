@@ -14,7 +14,6 @@ from typing import Any
 from jaxident.errors import InputError
 from jaxident.files.atomic import Target, check_target, write_text
 from jaxident.files.json_text import format_json, read_json
-from jaxident.files.logs import find_logs
 from jaxident.files.schema import take_keys, take_list, take_object, take_text
 from jaxident.files.source import Source, explained
 from jaxident.origin import Input, Origin
@@ -47,10 +46,11 @@ def checksum(path: Source) -> str | None:
 
 
 def _parts(folder: pathlib.Path) -> list[pathlib.Path]:
-    """The files that a folder stands for."""
-    if (folder / BAG_INDEX).is_file():
-        return sorted(entry for entry in folder.iterdir() if entry.is_file() and not entry.name.startswith("."))
-    return [pathlib.Path(log) for log in find_logs(folder)]
+    """The files that a folder stands for: all of a bag's, or its tables."""
+    with explained(os.fspath(folder), "regular"):
+        there = sorted(entry for entry in folder.iterdir() if entry.is_file() and not entry.name.startswith("."))
+    bag = folder / BAG_INDEX in there
+    return [entry for entry in there if bag or entry.name.endswith((".csv", ".csv.gz"))]
 
 
 def origin_to_dict(origin: Origin) -> dict[str, Any]:
