@@ -1,6 +1,7 @@
 """`jaxident diagnose`, as a user runs it: quickly what it refuses, and slowly what it finds."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -104,30 +105,17 @@ def test_the_effect_of_an_example_is_found(tmp_path, effect):
     }  # fmt: skip
 
 
-def noisy(log):
-    """The log with 1e-10 added to every number, up or down."""
-    draw = np.random.default_rng(5)
-    names = ("u_r", "u_l", "x", "y", "theta")
-    return log._replace(**{name: getattr(log, name) + draw.uniform(-1e-10, 1e-10, len(log.t)) for name in names})
-
-
 @pytest.mark.slow
-def test_neither_the_order_of_numbered_logs_nor_the_last_digits_change_what_is_said(tmp_path):
-    """And the same logs give the same bytes, in another folder and another order too."""
+def test_the_same_logs_give_the_same_bytes_in_any_order_and_in_any_folder(tmp_path):
+    """Logs that are numbered, listed forwards and backwards."""
     from jaxident.cli.example import command as example
 
     assert CliRunner().invoke(example, ["--effect", "transport_delay", "--out", str(tmp_path / "a")]).exit_code == 0
-    paths = sorted((tmp_path / "a").glob("real_*.csv"))
-    for folder, change in (("b", lambda log: log), ("c", noisy)):
-        (tmp_path / folder).mkdir()
-        for path in paths:
-            write_log(change(read_log(path)), tmp_path / folder / path.name)
-    said, made = {}, {}
-    for folder, order in (("a", 1), ("b", -1), ("c", 1)):
-        words = [str(tmp_path / folder / path.name) for path in paths[::order]]
-        result = CliRunner().invoke(command, [*words, "--out", str(tmp_path / folder / "out")])
+    shutil.copytree(tmp_path / "a", tmp_path / "b")
+    made = []
+    for folder, order in (("a", 1), ("b", -1)):
+        paths = sorted((tmp_path / folder).glob("real_*.csv"))[::order]
+        result = CliRunner().invoke(command, [*map(str, paths), "--out", str(tmp_path / folder / "out")])
         assert result.exit_code == 0, result
-        said[folder] = [line for line in result.output.splitlines() if not line.startswith("wrote ")]
-        made[folder] = {path.name: path.read_bytes() for path in (tmp_path / folder / "out").iterdir()}
-    assert said["a"] == said["b"] == said["c"]
-    assert made["a"] == made["b"]
+        made.append({path.name: path.read_bytes() for path in (tmp_path / folder / "out").iterdir()})
+    assert made[0] == made[1]
