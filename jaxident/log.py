@@ -233,6 +233,6 @@ def even_period(log: Log) -> float:
     if odd.size:
         raise InputError(
             f"uneven time steps: the step from t = {starts[odd[0]]:.6g} s takes {steps[odd[0]]:.4g} s, the others "
-            f"{period:.4g} s; this method needs an even log, `jaxident convert --period` makes one"
+            f"{period:.4g} s; this method needs an even log: `jaxident convert --log LOG --period S --out NEW`"
         )
     return float(period)

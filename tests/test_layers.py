@@ -8,7 +8,7 @@ import sys
 
 PACKAGE = pathlib.Path(__file__).resolve().parents[1] / "jaxident"
 
-GROUND = ("array_types", "errors", "numerics", "rules", "columns", "log", "start")
+GROUND = ("array_types", "errors", "numerics", "origin", "rules", "columns", "log", "start")
 FLOORS = (
     ("ground",),
     ("robot",),

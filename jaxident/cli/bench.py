@@ -3,11 +3,12 @@
 import click
 
 from jaxident.cli.progress import working
+from jaxident.cli.record import Recorded, origin, with_provenance
 from jaxident.cli.session import json_option, seed_option, table, write_json
 from jaxident.start import start_jax
 
 
-@click.command()
+@click.command("bench", cls=Recorded)
 @click.option("--trials", type=click.IntRange(50), default=1000, show_default=True, help="Whole trials in a batch.")
 @seed_option
 @json_option
@@ -30,4 +31,4 @@ def command(trials, seed, json_file):
     numbers = [(name, f"{value:.4g}") for name, value in result.items() if isinstance(value, float)]
     click.echo(table([("figure", "value"), *numbers]))
     click.echo(", ".join(result["devices"]))
-    write_json(result, json_file)
+    write_json(with_provenance(result, origin("--json")), json_file)

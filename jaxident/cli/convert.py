@@ -1,11 +1,16 @@
 """`jaxident convert`."""
 
+import re
+
 import click
 
 from jaxident.cli.progress import working
+from jaxident.cli.record import Recorded, origin, tell_origin
 from jaxident.cli.session import ColumnsOption, Number, above_zero, check_outputs, columns_option, table, warn, wrote
 
-NEEDED = "give --commands CSV --poses CSV, or --bag PATH"
+NEEDED = "give --commands CSV --poses CSV, or --bag PATH, or --log LOG"
+OFFSET_ADVICE = re.compile(r"jaxident convert --log LOG --pose-offset (\S+) --out NEW")
+"""As `suspicions` words it."""
 
 
 class OffsetOption(Number):
@@ -23,22 +28,29 @@ class OffsetOption(Number):
             self.fail(f"{value!r} is neither a time in seconds nor auto", param, ctx)
 
 
-class OrderOption(click.ParamType):
-    """RIGHT,LEFT: indices or joint names."""
+class PairOption(click.ParamType):
+    """Two different words."""
 
-    name = "RIGHT,LEFT"
+    def __init__(self, name: str, wanted: str) -> None:
+        self.name, self.wanted = name, wanted
 
     def convert(self, value, param, ctx):
         """Both words."""
         words = tuple(word.strip() for word in value.split(",")) if isinstance(value, str) else value
         if len(words) != 2 or not all(words) or words[0] == words[1]:
-            self.fail(f"{value!r} should be two indices or joint names, the right wheel first, as in 1,0", param, ctx)
+            self.fail(f"{value!r} should be two {self.wanted}", param, ctx)
         return words
 
 
-@click.command()
+ORDER = PairOption("RIGHT,LEFT", "indices or joint names, the right wheel first, as in 1,0")
+FRAMES = PairOption("FIXED,ROBOT", "frames, the robot's last, as in map,base_link")
+
+
+@click.command("convert", cls=Recorded)
 @click.option("--commands", metavar="CSV", help="Columns t,v,w or t,u_r,u_l.")
 @click.option("--poses", metavar="CSV", help="Columns t,x,y,theta or t,x,y,qx,qy,qz,qw.")
+@click.option("--log", metavar="LOG", help="A finished log (file or folder) in place of both, for --pose-offset, "
+              "--period and --columns.")  # fmt: skip
 @click.option("--bag", metavar="PATH", help="A ROS bag in place of both: .bag, .db3, .mcap or a ROS 2 folder.")
 @click.option("--list", "listing", is_flag=True, help="Show the topics of --bag, and which look right.")
 @click.option("--command-topic", metavar="T", help="Twist, TwistStamped, Float64MultiArray or JointState.")
@@ -46,7 +58,9 @@ class OrderOption(click.ParamType):
     "--pose-topic", metavar="T", help="PoseStamped, PoseWithCovarianceStamped, TransformStamped, tf, Odometry."
 )
 @click.option("--child-frame", metavar="F", help="Of a tf topic: the frame that moves with the robot.")
-@click.option("--wheel-order", type=OrderOption(), help="Which numbers or joints are the wheels, the right one first.")
+@click.option("--pose-frames", type=FRAMES, help="Compose tf from a fixed frame to the robot's, as in "
+              "map,base_link.")  # fmt: skip
+@click.option("--wheel-order", type=ORDER, help="Which numbers or joints are the wheels, the right one first.")
 @click.option("--bag-time", is_flag=True, help="Times of recording in place of the headers' stamps.")
 @columns_option
 @click.option("--command-columns", type=ColumnsOption(), default="", help="As --columns, for the commands alone.")
@@ -57,41 +71,103 @@ class OrderOption(click.ParamType):
               "auto finds it, a delay of the robot included.")  # fmt: skip
 @click.option("--hold-timeout", type=above_zero, metavar="S", help="A command older than this counts as zero.")
 @click.option("--out", metavar="LOG", help="The log to write (.csv or .csv.gz).")
-def command(commands, poses, bag, listing, out, period, track, pose_offset, hold_timeout, **chosen):
-    """Two streams, each with its own times, to one log. Never interpolates a pose.
+def command(**chosen):
+    """Two streams, each with its own times, to one log; or a log to a better one. A topic's pose is never interpolated.
 
     Example: jaxident convert --commands cmd.csv --poses mocap.csv --track 0.26 --period 0.05 --out log.csv
+
+    Example: jaxident convert --log log.csv --pose-offset auto --out mended.csv
     """
-    if bool(bag) == bool(commands or poses) or (not bag and not (commands and poses)):
-        raise click.UsageError(NEEDED)
-    if listing and not bag:
-        raise click.UsageError("--list shows the topics of --bag PATH")
-    if listing:
-        _list(bag)
+    _check_sources(chosen)
+    if chosen["listing"]:
+        _list(chosen["bag"])
         return
+    out = chosen["out"]
     if not out:
         raise click.UsageError("Missing option '--out': the log to write")
     import numpy as np
 
     from jaxident.estimation.suspicions import log_suspicions
     from jaxident.files.logs import write_log
-    from jaxident.files.streams import merge
+    from jaxident.files.origins import check_beside
 
     check_outputs(out)
+    check_beside(out)
+    made = origin("--out")
     with working("converting"):
-        given, seen, notes = _from_bag(bag, chosen) if bag else _from_files(commands, poses, chosen)
-        offset, told = _estimate(given, seen, track) if pose_offset == "auto" else (pose_offset, ())
-        settings = {"period": period, "track": track, "pose_offset": offset, "hold_timeout": hold_timeout}
-        log = merge(given, seen, **settings)
+        log, offset, notes = _from_log(chosen) if chosen["log"] else _from_streams(chosen)
         doubts = log_suspicions(log)
         write_log(log, out)
-    for note in (*notes, *told):
+    for note in notes:
         click.echo(note)
     own = chosen["columns"] | chosen["command_columns"] | chosen["pose_columns"]
-    warn(_for_speeds(doubts) if track else doubts, own)
+    lines = [_with_offset(line, offset, bool(chosen["log"])) for line in doubts]
+    warn(_for_speeds(lines) if chosen["track"] else lines, own)
     measured = np.count_nonzero(np.isfinite(log.x))
-    click.echo(f"{len(log.t)} rows, {measured} with a pose, {log.t[-1] - log.t[0]:.6g} s")
+    length = sum(run.t[-1] - run.t[0] for run in log.runs())
+    click.echo(f"{len(log.t)} rows, {measured} with a pose, {length:.6g} s")
     wrote(out)
+    tell_origin(out, made)
+
+
+STREAMS_ALONE = ("track", "hold_timeout", "command_columns", "pose_columns", "command_topic", "pose_topic",
+                 "child_frame", "pose_frames", "wheel_order", "bag_time")  # fmt: skip
+"""Options that a finished log has no use for."""
+
+
+def _check_sources(chosen) -> None:
+    """UsageError unless there is one source, with options that it knows."""
+    streams = bool(chosen["commands"] and chosen["poses"])
+    half = bool(chosen["commands"]) != bool(chosen["poses"])
+    if half or streams + bool(chosen["bag"]) + bool(chosen["log"]) != 1:
+        raise click.UsageError(NEEDED)
+    if chosen["child_frame"] and chosen["pose_frames"]:
+        raise click.UsageError("--pose-frames FIXED,ROBOT names the robot's frame; leave --child-frame out")
+    if chosen["listing"] and not chosen["bag"]:
+        raise click.UsageError("--list shows the topics of --bag PATH")
+    foreign = next((name for name in STREAMS_ALONE if chosen["log"] and chosen[name]), None)
+    if foreign is not None:
+        raise click.UsageError(f"--{foreign.replace('_', '-')} is for two streams; --log LOG has its rows already")
+
+
+def _with_offset(line: str, offset: float, finished: bool) -> str:
+    """A line about clocks that differ with the offset for this call: what is left and what was given already."""
+    found = OFFSET_ADVICE.search(line)
+    if not found:
+        return line
+    option = f"--pose-offset {float(found[1]) + offset:.3g}"
+    return line.replace(found[0], f"jaxident convert {f'--log LOG {option} --out NEW' if finished else option}")
+
+
+def _from_log(chosen):
+    """The log made of a finished one, the offset, and notes, a line each."""
+    from jaxident.files.logs import read_whole
+    from jaxident.files.offset import estimate_log_offset
+    from jaxident.files.shifted import shift_poses
+
+    log = read_whole(chosen["log"], chosen["columns"])
+    offset, told = _offset(chosen, lambda: estimate_log_offset(log))
+    return shift_poses(log, offset, chosen["period"]), offset, told
+
+
+def _from_streams(chosen):
+    """The log made of two streams, the offset, and notes, a line each."""
+    from jaxident.files.offset import estimate_offset
+    from jaxident.files.streams import merge
+
+    given, seen, notes = _from_bag(chosen) if chosen["bag"] else _from_files(chosen)
+    offset, told = _offset(chosen, lambda: estimate_offset(given, seen, chosen["track"]))
+    settings = {name: chosen[name] for name in ("period", "track", "hold_timeout")}
+    return merge(given, seen, pose_offset=offset, **settings), offset, (*notes, *told)
+
+
+def _offset(chosen, estimate):
+    """The offset that was asked for, and a line that tells one that was found."""
+    if chosen["pose_offset"] != "auto":
+        return chosen["pose_offset"], ()
+    found = estimate()
+    error = f"standard error {found.standard_error:.1g} s"
+    return found.offset, (f"--pose-offset {found.offset:.6f} ({error}; a delay of the robot counts in it)",)
 
 
 IN_SPEEDS = {
@@ -109,30 +185,21 @@ def _for_speeds(lines):
     return lines
 
 
-def _from_files(commands, poses, chosen):
+def _from_files(chosen):
     from jaxident.files.streams import read_commands, read_poses
 
     columns = chosen["columns"]
-    given = read_commands(commands, columns | chosen["command_columns"])
-    return given, read_poses(poses, columns | chosen["pose_columns"]), ()
+    given = read_commands(chosen["commands"], columns | chosen["command_columns"])
+    return given, read_poses(chosen["poses"], columns | chosen["pose_columns"]), ()
 
 
-def _from_bag(bag, chosen):
+def _from_bag(chosen):
     from jaxident.files.bags import read_bag_streams
     from jaxident.files.messages import Choice
 
-    choice = Choice(chosen["child_frame"], chosen["wheel_order"], chosen["bag_time"])
+    choice = Choice(chosen["child_frame"], chosen["wheel_order"], chosen["bag_time"], chosen["pose_frames"])
     columns = chosen["columns"] | chosen["command_columns"] | chosen["pose_columns"]
-    return read_bag_streams(bag, chosen["command_topic"], chosen["pose_topic"], choice, columns)
-
-
-def _estimate(given, seen, track):
-    """The offset, and a line that tells it."""
-    from jaxident.files.offset import estimate_offset
-
-    found = estimate_offset(given, seen, track)
-    error = f"standard error {found.standard_error:.1g} s"
-    return found.offset, (f"--pose-offset {found.offset:.6f} ({error}; a delay of the robot counts in it)",)
+    return read_bag_streams(chosen["bag"], chosen["command_topic"], chosen["pose_topic"], choice, columns)
 
 
 def _list(bag) -> None:

@@ -6,6 +6,7 @@ import os
 import click
 
 from jaxident.cli.progress import working
+from jaxident.cli.record import Recorded, origin, with_provenance
 from jaxident.cli.session import above_zero, check_outputs, columns_option, seed_option, table, warn, write_json, wrote
 from jaxident.start import start_jax
 
@@ -20,7 +21,7 @@ SENTENCE = {
 }
 
 
-class SeveralPerOption(click.Command):
+class SeveralPerOption(Recorded):
     """A command whose option --sim takes all words up to the next option, as a shell's pattern gives them."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -39,7 +40,7 @@ class SeveralPerOption(click.Command):
         return super().parse_args(ctx, spread)
 
 
-@click.command(cls=SeveralPerOption)
+@click.command("diagnose", cls=SeveralPerOption)
 @click.argument("logs", nargs=-1, required=True, metavar="LOG...")
 @click.option("--sim", multiple=True, metavar="LOG...", help="Logs of your own simulator, after those of the robot.")
 @click.option("--model", metavar="MODEL", help="A model to judge as it stands, effects included.")
@@ -59,14 +60,14 @@ def command(logs, columns, sim, model, horizon, out, seed):
     from jaxident.estimation.suspicions import log_suspicions
     from jaxident.files.atomic import make_folder
     from jaxident.files.diagnosis import diagnosis_to_dict
-    from jaxident.files.logs import find_simulated, read_log, read_logs
+    from jaxident.files.logs import find_logs, find_simulated, read_log, read_logs
     from jaxident.files.models import load_model, save_model
     from jaxident.log import join
     from jaxident.report.diagnosis import diagnosis_page
     from jaxident.report.page import write_page
 
-    records = read_logs(logs, columns)
-    theirs = read_logs(sim) if sim else [read_log(path) for path in find_simulated(logs)]
+    records, simulated = read_logs(logs, columns), find_logs(sim) if sim else find_simulated(logs)
+    theirs = [read_log(path) for path in simulated]
     nominal = load_model(model) if model else None
     warn(log_suspicions(join(records)), columns)
     warn(f"the simulator's logs: {line}" for line in (log_suspicions(join(theirs)) if theirs else ()))
@@ -74,29 +75,30 @@ def command(logs, columns, sim, model, horizon, out, seed):
     check_outputs(*(os.path.join(out, name) for name in OUTPUTS))
     with working("diagnosing"):
         found = diagnose(records, sim=theirs or None, model=nominal, horizon=horizon, seed=seed)
-    found = _with_origin(found, logs, seed)
-    content = diagnosis_to_dict(found)
+    made = origin(OUTPUTS[0], logs=find_logs(logs), sim=simulated)
     click.echo("\n".join(_told(found)))
-    write_json(content, os.path.join(out, "diagnosis.json"))
-    for name, written in (("nominal_model", found.nominal_model), ("corrected_model", found.corrected_model)):
-        path = os.path.join(out, f"{name}.json")
-        save_model(written, path)
-        wrote(path)
-    page = os.path.join(out, "report.html")
-    write_page(diagnosis_page(found, ", ".join(logs)), page)
+    write_json(with_provenance(diagnosis_to_dict(found), made, OUTPUTS[0]), os.path.join(out, OUTPUTS[0]))
+    for name, written in zip(OUTPUTS[1:3], (found.nominal_model, found.corrected_model), strict=True):
+        save_model(_with_origin(written, made._replace(output=name)), os.path.join(out, name))
+        wrote(os.path.join(out, name))
+    page = os.path.join(out, OUTPUTS[3])
+    write_page(diagnosis_page(found, _title(logs), made), page)
     wrote(page)
 
 
-def _with_origin(found, logs, seed: int):
-    """The diagnosis, its models saying where they come from."""
-    import jaxident
+def _with_origin(model, made):
+    """The model, saying where it comes from."""
+    from jaxident.files.origins import with_origin
 
-    told = {"version": jaxident.__version__, "logs": tuple(logs), "seed": seed}
-    models = {
-        name: dataclasses.replace(model, provenance=model.provenance._replace(**told))
-        for name, model in (("nominal_model", found.nominal_model), ("corrected_model", found.corrected_model))
-    }
-    return found._replace(**models)
+    return dataclasses.replace(model, provenance=with_origin(model.provenance, made))
+
+
+def _title(logs) -> str:
+    """The name of the folder, or the names of the logs, without what leads to them."""
+    from jaxident.files.logs import find_logs
+
+    named = logs if len(logs) == 1 else find_logs(logs)
+    return ", ".join(os.path.basename(os.path.normpath(path)) for path in named)
 
 
 def _told(found) -> list[str]:

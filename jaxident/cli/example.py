@@ -1,15 +1,17 @@
 """`jaxident example`."""
 
+import dataclasses
 import os
 
 import click
 
 from jaxident.cli.progress import working
+from jaxident.cli.record import Recorded, origin
 from jaxident.cli.session import seed_option, wrote
 from jaxident.start import start_jax
 
 
-@click.command()
+@click.command("example", cls=Recorded)
 @click.option("--out", default="example", show_default=True, metavar="DIR", help="The folder to write.")
 @click.option("--effect", metavar="NAME", help="Of the catalogue (`jaxident effects`), or `none`; else drawn.")
 @seed_option
@@ -27,6 +29,7 @@ def command(out, effect, seed):
     from jaxident.files.atomic import make_folder
     from jaxident.files.logs import write_log
     from jaxident.files.models import load_model, save_model
+    from jaxident.files.origins import with_origin
     from jaxident.study.example import draw_effect, example_robot, example_runs
 
     key_robot, key_runs = jax.random.split(jax.random.key(seed))
@@ -40,5 +43,6 @@ def command(out, effect, seed):
         write_log(run, path)
         wrote(path)
     answer = os.path.join(out, ".answer.json")
-    save_model(robot, answer)
+    told = with_origin(robot.provenance, origin(os.path.basename(answer)))
+    save_model(dataclasses.replace(robot, provenance=told), answer)
     wrote(answer)

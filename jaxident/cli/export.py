@@ -3,7 +3,8 @@
 import click
 
 from jaxident.cli.progress import working
-from jaxident.cli.session import json_option, write_json, wrote
+from jaxident.cli.record import Recorded, origin, tell_origin, with_provenance
+from jaxident.cli.session import check_outputs, json_option, write_json, wrote
 from jaxident.start import start_jax
 
 TARGETS = ("mjcf", "gazebo", "isaac", "ros2_control", "robot_localization", "c-header", "python", "table")
@@ -11,7 +12,7 @@ UNITS = ("unit", "rad/s", "m/s")
 POSITIVE = click.FloatRange(0, min_open=True)
 
 
-@click.command()
+@click.command("export", cls=Recorded)
 @click.argument("model")
 @click.option("--to", "target", required=True, type=click.Choice(TARGETS), help="Simulator, controller or program.")
 @click.option("--out", required=True, metavar="PATH", help="The file to write, its wrapper beside it.")
@@ -33,7 +34,13 @@ def command(model, target, out, wheel_radius, track, mass, limit, command_unit, 
     """
     start_jax()
     from jaxident.export.export import commands_path, export
+    from jaxident.export.gap import beside
+    from jaxident.files.origins import check_beside
 
+    check_outputs(out, json_file)
+    check_beside(out)
+    diagnosis = diagnosis or beside(model)
+    made_from = origin("--out", **({"diagnosis": [str(diagnosis)]} if diagnosis else {}))
     with working("exporting"):
         made = export(model, target, out, wheel_radius=wheel_radius, track=track, mass=mass, limit=limit,
                       command_unit=command_unit, diagnosis=diagnosis)  # fmt: skip
@@ -43,8 +50,10 @@ def command(model, target, out, wheel_radius, track, mass, limit, command_unit, 
     files = [out] if made.commands is None else [out, str(commands_path(out))]
     for file in files:
         wrote(file)
+    files += tell_origin(out, made_from)
     parts = [part._asdict() for part in made.parts]
-    write_json({"target": target, "files": files, "assumed": made.assumed, "parts": parts}, json_file)
+    content = {"target": target, "files": files, "assumed": made.assumed, "parts": parts}
+    write_json(with_provenance(content, made_from), json_file)
 
 
 def _table(rows: list[tuple[str, str, str]]) -> str:

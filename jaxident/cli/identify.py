@@ -5,6 +5,7 @@ import dataclasses
 import click
 
 from jaxident.cli.progress import working
+from jaxident.cli.record import Recorded, origin, with_provenance
 from jaxident.cli.session import (
     Number,
     above_zero,
@@ -33,7 +34,7 @@ NOTES = {
 }
 
 
-@click.command()
+@click.command("identify", cls=Recorded)
 @click.argument("logs", nargs=-1, required=True, metavar="LOG...")
 @click.option(
     "--method",
@@ -83,12 +84,12 @@ def command(logs, columns, method, reading, count, resample, seed, out, report, 
     Example: jaxident identify log.csv --out model.json
     """
     start_jax()
-    import jaxident
     from jaxident.estimation.identify import identify
     from jaxident.estimation.session import with_session
     from jaxident.estimation.verdict import verdicts
-    from jaxident.files.logs import read_logs
+    from jaxident.files.logs import find_logs, read_logs
     from jaxident.files.models import model_to_dict, save_model
+    from jaxident.files.origins import with_origin
     from jaxident.log import join
 
     for option in [name for name, value in (("--report", report), ("--bootstrap", count)) if value is not None]:
@@ -100,8 +101,9 @@ def command(logs, columns, method, reading, count, resample, seed, out, report, 
         found = identify(records, method, reading=reading and reading.replace("-", "_"), **settings)
     _warn(found, columns)
     again = count and _resample(found, records, count, resample, seed, settings["d_max"])
-    origin = found.model.provenance._replace(version=jaxident.__version__, method=method, logs=tuple(logs))
-    model = dataclasses.replace(found.model, provenance=with_session(origin, join(records)))
+    made = origin("--out", logs=find_logs(logs))
+    told = with_origin(with_session(found.model.provenance._replace(method=method), join(records)), made)
+    model = dataclasses.replace(found.model, provenance=told)
     rows = verdicts(model, max(float(abs(u).max()) for record in records for u in record.command))
     _say(found, rows, method, again)
     if out:
@@ -113,7 +115,8 @@ def command(logs, columns, method, reading, count, resample, seed, out, report, 
         for path in write_identification(found._replace(model=model), records, rows, report, again):
             wrote(path)
     result = {"parameters": [row._asdict() for row in rows], "suspicions": found.suspicions}
-    write_json({"model": model_to_dict(model)} | result | ({"bootstrap": _as_dict(again)} if again else {}), json_file)
+    content = {"model": model_to_dict(model)} | result | ({"bootstrap": _as_dict(again)} if again else {})
+    write_json(with_provenance(content, made), json_file)
 
 
 def _warn(found, columns) -> None:

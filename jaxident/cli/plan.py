@@ -3,6 +3,7 @@
 import click
 
 from jaxident.cli.progress import working
+from jaxident.cli.record import Recorded, origin, tell_origin, with_provenance
 from jaxident.cli.session import (
     MOST_ROWS,
     above_zero,
@@ -19,7 +20,7 @@ PLAIN = 9.0
 """Separation from which a diagnosis names one effect and not the other, odds of thousands to one."""
 
 
-@click.command()
+@click.command("plan", cls=Recorded)
 @click.argument("model")
 @click.option("--between", required=True, metavar="A,B", help="Two effects (`jaxident effects` lists them).")
 @click.option(
@@ -42,8 +43,11 @@ def command(model, between, samples, limit, out, seed, json_file):
     from jaxident.diagnosis.planning.next_run import plan
     from jaxident.files.logs import write_log
     from jaxident.files.models import load_model
+    from jaxident.files.origins import check_beside
 
     check_outputs(out, json_file)
+    check_beside(out)
+    made = origin("--out")
     names = tuple(name.strip() for name in between.split(","))
     robot = load_model(model)
     with working("trying inputs"):
@@ -51,7 +55,8 @@ def command(model, between, samples, limit, out, seed, json_file):
     write_log(found.log, out)
     click.echo(_described(found))
     wrote(out)
-    write_json(_content(found, samples, limit), json_file)
+    tell_origin(out, made)
+    write_json(with_provenance(_content(found, samples, limit), made), json_file)
 
 
 def _described(found) -> str:

@@ -3,12 +3,13 @@
 import click
 
 from jaxident.cli.progress import working
+from jaxident.cli.record import Recorded, origin, tell_origin, with_provenance
 from jaxident.cli.session import Number, check_outputs, columns_option, json_option, rows_option, write_json, wrote
 from jaxident.errors import WorkError
 from jaxident.start import start_jax
 
 
-@click.command()
+@click.command("predict", cls=Recorded)
 @click.argument("model")
 @click.argument("log")
 @click.option("--horizon", type=rows_option, required=True, metavar="N", help="Rows of each free run.")
@@ -31,10 +32,12 @@ def command(model, log, horizon, burn_in, stride, first, last, session_time, out
     from jaxident.estimation.session import time_in_session
     from jaxident.files.logs import read_whole
     from jaxident.files.models import load_model
+    from jaxident.files.origins import check_beside
     from jaxident.files.predictions import write_prediction
     from jaxident.log import between
 
     check_outputs(out, json_file)
+    check_beside(out)
     robot, whole = load_model(model), read_whole(log, columns)
     record = between(whole, first, last)
     begin, known = time_in_session(robot, whole, record)
@@ -44,11 +47,13 @@ def command(model, log, horizon, burn_in, stride, first, last, session_time, out
     summary = prediction_error(prediction, record) | {"session_time": begin}
     if summary["failed"] == summary["starts"]:
         raise WorkError(f"{model}: none of {summary['starts']} predictions is finite: the model runs away on {log}")
+    made = origin("--out")
     write_prediction(prediction, out)
     for line in _told(summary, robot, session_time is not None, known):
         click.echo(line)
     wrote(out)
-    write_json(summary, json_file)
+    tell_origin(out, made)
+    write_json(with_provenance(summary, made), json_file)
 
 
 def _told(summary, robot, given: bool, known: bool) -> list[str]:

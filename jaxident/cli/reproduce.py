@@ -5,11 +5,14 @@ import os
 import click
 
 from jaxident.cli.progress import working
+from jaxident.cli.record import Recorded, origin, with_provenance
 from jaxident.cli.session import json_option, seed_option, table, write_json, wrote
 from jaxident.start import start_jax
 
+TABLE = "table.json"
 
-@click.command()
+
+@click.command("reproduce", cls=Recorded)
 @click.option("--out", default="reproduction", show_default=True, metavar="DIR", help="The folder to write.")
 @click.option("--seeds", type=click.IntRange(2), default=200, show_default=True, help="Noisy copies at each level.")
 @seed_option
@@ -36,8 +39,8 @@ def command(out, seeds, seed, json_file):
     click.echo(table([("parameter", "true", "paper", "ours", "standard error"), *map(_cells, rows)]))
     for path in paths:
         wrote(path)
-    content = {"rows": [row._asdict() for row in rows]}
-    write_json(content, os.path.join(out, "table.json"))
+    content = with_provenance({"rows": [row._asdict() for row in rows]}, origin(TABLE), TABLE)
+    write_json(content, os.path.join(out, TABLE))
     write_json(content, json_file)
 
 

@@ -3,6 +3,7 @@
 import click
 
 from jaxident.cli.progress import working
+from jaxident.cli.record import Recorded, origin, tell_origin
 from jaxident.cli.session import MOST_ROWS, above_zero, check_outputs, effect_option, rows_option, seed_option, wrote
 from jaxident.start import start_jax
 
@@ -25,7 +26,7 @@ class Noise(click.ParamType):
         return position, heading
 
 
-@click.command()
+@click.command("simulate", cls=Recorded)
 @click.argument("model")
 @click.option("--inputs", metavar="LOG", help="Take times and commands from this log (`-`: standard input).")
 @click.option("--excitation", type=click.Choice(EXCITATION_NAMES), help="Make the commands instead.")
@@ -55,9 +56,12 @@ def command(model, inputs, excitation, samples, amplitude, hold, effects, noise,
     from jaxident.effects.apply import with_effects
     from jaxident.files.logs import read_log, write_log
     from jaxident.files.models import load_model
+    from jaxident.files.origins import check_beside
     from jaxident.study.synthetic import excite, simulate_runs
 
     check_outputs(out)
+    check_beside(out)
+    made = origin("--out")
     robot = with_effects(load_model(model), effects)
     key_input, key_noise = jax.random.split(jax.random.key(seed))
     with working("simulating"):
@@ -67,3 +71,4 @@ def command(model, inputs, excitation, samples, amplitude, hold, effects, noise,
             log = read_log(inputs)
         write_log(simulate_runs(robot, log, noise=noise, key=key_noise), out)
     wrote(out)
+    tell_origin(out, made)

@@ -5,11 +5,12 @@ import os
 import click
 
 from jaxident.cli.progress import counting, working
+from jaxident.cli.record import Recorded, origin, tell_origin
 from jaxident.cli.session import seed_option, table, wrote
 from jaxident.start import start_jax
 
 
-@click.command()
+@click.command("sweep", cls=Recorded)
 @click.argument("study", metavar="STUDY.toml", required=False)
 @click.option("--out", metavar="DIR", help="Folder of the results; a second call goes on where the first stopped.")
 @click.option("--scheduler", metavar="ADDRESS|local:N", help="Compute with Dask: a scheduler, or N local processes.")
@@ -62,6 +63,7 @@ def _run_all(plan, out, scheduler):
         paths += write_study(plan, trials, summary, os.path.join(out, "index.html"))
     for name in paths:
         wrote(name)
+    tell_origin(paths[0], origin("summary.csv"))
     failed = int(summary["failures"].sum())
     click.echo(f"{plan.trials} trials, {len(plan.estimators)} estimators, {failed} failed estimates")
 
@@ -91,3 +93,4 @@ def _run_one(plan, number, out):
     log = make_log(period * np.arange(len(recording.exact.x)), *recording.command, *recording.measured)
     write_log(log, f"{stem}.csv")
     wrote(f"{stem}.csv")
+    tell_origin(f"{stem}.csv", origin(f"trial_{number}.csv"))

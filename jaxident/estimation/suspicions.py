@@ -189,7 +189,7 @@ def offset_clock(response: Response, step: float) -> str:
     known = response.rival is None and np.max(response.explained) > EXPLAINED
     if not known or not (late > max(SEVERAL * step, SURE * error) or -late > max(EARLY * step, SURE * error)):
         return ""
-    mend = f"`jaxident convert --pose-offset {response.offset:.3g}`"
+    mend = f"`jaxident convert --log LOG --pose-offset {response.offset:.3g} --out NEW`"
     told = f"{abs(late):.3g} s (standard error {error:.1g} s, {abs(late) / step:.1f} rows)"
     if late < 0.0:
         return f"the robot moves {told} before it is told to: the poses have another clock than the commands: {mend}"

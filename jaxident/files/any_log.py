@@ -20,6 +20,9 @@ def as_logs(given: Any) -> list[Log]:
     if hasattr(given, "keys") and hasattr(given, "__getitem__"):  # a dict and any library's data frame
         return [from_frame(given)]
     if isinstance(given, Iterable):
+        given = list(given)
+        if given and all(isinstance(one, str | os.PathLike) for one in given):
+            return read_logs(given)
         logs = [log for one in given for log in as_logs(one)]
         if logs:
             return logs

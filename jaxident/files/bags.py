@@ -16,7 +16,8 @@ import numpy as np
 from jaxident.array_types import Pose, Wheels
 from jaxident.columns import QUATERNION, Columns, heading_of, make_columns, seconds
 from jaxident.errors import InputError
-from jaxident.files.messages import COMMANDS, POSES, Choice, MessageReader
+from jaxident.files.bag_transforms import STATIC, check_clock, read_pose_of_frame
+from jaxident.files.messages import COMMANDS, POSES, TRANSFORMS, Choice, MessageReader
 from jaxident.files.streams import Commands, Poses, Speeds, merge
 from jaxident.log import Log
 
@@ -54,6 +55,7 @@ def read_bag(
     pose_topic: str | None = None,
     *,
     child_frame: str | None = None,
+    frames: tuple[str, str] | None = None,
     wheel_order: tuple[str, str] | None = None,
     bag_time: bool = False,
     columns: Mapping[str, str] | str | None = None,
@@ -63,11 +65,12 @@ def read_bag(
     """One log from two topics of a bag; `settings` (period, track, pose_offset, hold_timeout) go to `merge`.
 
     A topic that is left out is the only one that looks right. child_frame: which transform of a tf topic is the robot.
+    frames: a fixed frame and the robot's, between which the transforms of all tf topics are composed (`transforms`).
     wheel_order: indices (Float64MultiArray) or joint names (JointState) of the right and the left wheel. bag_time: the
     time of recording in place of the headers' stamps. columns, units: changes to the columns v,w or u_r,u_l and
     x,y,theta as in `Log.from_dataframe`. InputError names what is wrong and what there is.
     """
-    chosen, choice = make_columns(columns, units), Choice(child_frame, wheel_order, bag_time)
+    chosen, choice = make_columns(columns, units), Choice(child_frame, wheel_order, bag_time, frames)
     commands, poses, notes = read_bag_streams(path, command_topic, pose_topic, choice, chosen)
     for note in notes:
         warnings.warn(note, stacklevel=2)
@@ -85,9 +88,13 @@ def read_bag_streams(
     with open_bag(path) as reader:
         topics = _topics(reader)
         first, first_note = _chosen(path, topics, command_topic, "commands")
-        second, second_note = _chosen(path, topics, pose_topic, "poses")
         command = _read_topic(path, reader, first, COMMANDS, choice._replace(child_frame=None))
-        pose = _read_topic(path, reader, second, POSES, choice)
+        if choice.frames is None:
+            second, second_note = _chosen(path, topics, pose_topic, "poses")
+            pose = _read_topic(path, reader, second, POSES, choice)
+        else:
+            second_note = ()
+            pose = BagStream(*read_pose_of_frame(path, reader, _of_transforms(path, topics, pose_topic), choice))
     values = [_in_si(stream.columns, columns or {}) for stream in (command, pose)]
     kind = Speeds if "v" in values[0] else Wheels
     notes = (*first_note, *second_note, *command.notes, *pose.notes)
@@ -161,6 +168,17 @@ def _chosen(path: Any, topics: list[Topic], wanted: str | None, what: str) -> tu
     return fitting[0], (f"{option} {fitting[0].name}: the only one that could be {what}",)
 
 
+def _of_transforms(path: Any, topics: list[Topic], wanted: str | None) -> list[str]:
+    """Names of the topics that hold transforms: those that are wanted and the static ones; InputError for none."""
+    there = [topic.name for topic in topics if topic.type in TRANSFORMS and topic.messages]
+    chosen = [name for name in there if wanted in (None, name) or name.endswith(STATIC)]
+    if not there or (wanted is not None and wanted not in there):
+        listed = ", ".join(f"{topic.name} ({topic.type})" for topic in topics) or "none at all"
+        told = "no topic holds transforms" if wanted is None else f"{wanted} holds no transforms"
+        raise InputError(f"{path}: {told}; there are {listed}")
+    return chosen
+
+
 def _read_topic(
     path: Any, reader: Any, topic: Topic, readers: Mapping[str, MessageReader], choice: Choice
 ) -> BagStream:
@@ -184,7 +202,7 @@ def _read_topic(
             f"{place}: {unstamped} of {len(stamps)} messages have no stamp; --bag-time takes all times from the bag"
         )
     t = seconds(np.frombuffer(stamps, np.int64))
-    _check_clock(place, t)
+    check_clock(place, t)
     columns = dict(zip(names, np.frombuffer(values).reshape(-1, len(names)).T.copy(), strict=True))
     return _as_stream(t, columns, topic, bool(unstamped))
 
@@ -193,22 +211,14 @@ def _check_frame(place: str, frames: set[str], wanted: str | None) -> None:
     """InputError where several frames move and none is chosen, or the chosen one is not there."""
     listed = ", ".join(sorted(frames))
     if wanted is None and len(frames) > 1:
-        raise InputError(f"{place}: holds several frames; choose the robot's: --child-frame, one of {listed}")
+        raise InputError(
+            f"{place}: holds several frames; choose the robot's: --child-frame, one of {listed}, or compose them: "
+            "--pose-frames"
+        )
     if wanted is not None and wanted not in frames and frames != {""}:
         raise InputError(f"{place}: no child frame {wanted!r}; there are {listed}")
     if wanted is not None and frames == {""}:
         raise InputError(f"{place}: has no child frames; leave --child-frame out")
-
-
-def _check_clock(place: str, t: np.ndarray) -> None:
-    """InputError for a clock that goes back."""
-    back = np.flatnonzero(np.diff(t) < 0.0)
-    if back.size:
-        k = back[0]
-        raise InputError(
-            f"{place}: the clock goes back from {t[k]:.10g} to {t[k + 1]:.10g} s at message {k + 1}: a simulation that "
-            "was reset? Record anew, or cut the bag there; --bag-time takes times from the bag"
-        )
 
 
 def _as_stream(t: np.ndarray, columns: dict[str, np.ndarray], topic: Topic, unstamped: bool) -> BagStream:

@@ -57,7 +57,8 @@ def read_logs(paths: Source | Sequence[Source], columns: Columns | None = None) 
 
 
 def find_logs(paths: Source | Sequence[Source], prefix: str = "real_") -> list[str]:
-    """The log files among files and folders, in the order given.
+    """The log files among files and folders, in the order given; but files whose paths differ in numbers alone come in
+    the order of these numbers, as in a folder: how they were listed says nothing then.
 
     A file stands for itself. A folder stands for its logs (.csv, .csv.gz; not those of its own folders) whose names
     begin with `prefix` or, if there is none, for every log in it, in natural order: run_2 before run_10. InputError
@@ -69,7 +70,8 @@ def find_logs(paths: Source | Sequence[Source], prefix: str = "real_") -> list[s
         if not within:
             raise InputError(f"{path}: the folder holds no logs (.csv or .csv.gz)")
         found += within
-    return found
+    numbered = _numbered(found) and not any(os.path.isdir(path) for path in _listed(paths))
+    return sorted(found, key=_natural_path) if numbered else found
 
 
 def find_simulated(paths: Source | Sequence[Source]) -> list[str]:
@@ -114,7 +116,16 @@ def _logs_in(folder: pathlib.Path, prefix: str) -> list[str]:
     return [str(entry) for entry in sorted(logs, key=_natural)]
 
 
+def _numbered(paths: Sequence[str]) -> bool:
+    """Whether paths are the same but for their numbers, and no two are the same."""
+    return len(set(paths)) == len(paths) and len({re.sub("[0-9]+", "0", path) for path in paths}) == 1
+
+
 def _natural(path: pathlib.Path) -> tuple:
+    return _natural_path(path.name)
+
+
+def _natural_path(path: str) -> tuple:
     """Sorting key that compares runs of digits as numbers: the pieces are text and number by turns."""
-    pieces = re.split(r"([0-9]+)", path.name)
-    return tuple(int(piece) if k % 2 else piece for k, piece in enumerate(pieces)), path.name
+    pieces = re.split("([0-9]+)", path)
+    return tuple(int(piece) if k % 2 else piece for k, piece in enumerate(pieces)), path

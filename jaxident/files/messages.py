@@ -18,11 +18,13 @@ SPEED_COLUMNS, WHEEL_COLUMNS = ("v", "w"), ("u_r", "u_l")
 
 class Choice(NamedTuple):
     """What a topic alone does not say: the child frame of a transform, index or joint name of the right and the left
-    wheel, and whether the time of recording counts in place of the header's stamp."""
+    wheel, whether the time of recording counts in place of the header's stamp, and the frames between which transforms
+    are composed, the robot's last."""
 
     child_frame: str | None = None
     wheel_order: tuple[str, str] | None = None
     bag_time: bool = False
+    frames: tuple[str, str] | None = None
 
 
 class Reading(NamedTuple):
@@ -122,6 +124,23 @@ def read_transforms(message: Any, choice: Choice) -> Iterator[Reading]:
         yield from read_transform(transform, choice)
 
 
+class Moved(NamedTuple):
+    """One transform: stamp [ns], 0 where there is none; parent and child frame; x, y, z [m], quaternion x, y, z, w."""
+
+    stamp: int
+    parent: str
+    child: str
+    values: tuple[float, ...]
+
+
+def read_links(message: Any) -> Iterator[Moved]:
+    """The transforms of a message of TRANSFORMS; frames without the slash that old ROS 1 puts before them."""
+    for one in getattr(message, "transforms", [message]):
+        place, turn = one.transform.translation, one.transform.rotation
+        frames = one.header.frame_id.lstrip("/"), one.child_frame_id.lstrip("/")
+        yield Moved(stamp_of(one), *frames, (place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w))
+
+
 COMMANDS = {
     "geometry_msgs/msg/Twist": MessageReader(SPEED_COLUMNS, read_twist),
     "geometry_msgs/msg/TwistStamped": MessageReader(SPEED_COLUMNS, read_stamped_twist),
@@ -138,3 +157,5 @@ POSES = {
     "nav_msgs/msg/Odometry": MessageReader(POSE_COLUMNS, read_uncertain_pose),
 }
 """Readers of poses by message type."""
+TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage", "geometry_msgs/msg/TransformStamped")
+"""Types of messages that hold transforms."""

@@ -18,6 +18,7 @@ from jaxident.effects.catalogue import CATALOGUE
 from jaxident.errors import InputError
 from jaxident.files.atomic import Target, write_text
 from jaxident.files.json_text import format_json, parse_json, read_json
+from jaxident.files.model_provenance import read_provenance, write_provenance
 from jaxident.files.model_sections import (
     SHAPES,
     or_none,
@@ -26,7 +27,6 @@ from jaxident.files.model_sections import (
     read_effects,
     read_noise,
     read_physical,
-    read_provenance,
     read_spread,
     to_lists,
     write_covariance,
@@ -35,7 +35,6 @@ from jaxident.files.model_sections import (
     write_effect,
     write_noise,
     write_physical,
-    write_provenance,
 )
 from jaxident.files.schema import take_array, take_keys, take_number
 from jaxident.files.source import Source

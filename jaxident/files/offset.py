@@ -3,8 +3,9 @@
 import numpy as np
 
 from jaxident.errors import InputError
-from jaxident.estimation.clock_offset import Response, respond, streams_of
+from jaxident.estimation.clock_offset import Response, respond, streams_of, streams_of_log
 from jaxident.files.streams import Commands, Poses, wheel_speeds
+from jaxident.log import Log
 
 SMALLEST_SHARE = 0.05
 """Share of the motion's variance that the commands must explain."""
@@ -27,7 +28,16 @@ def estimate_offset(commands: Commands, poses: Poses, track: float | None = None
     streams = streams_of(
         t[change] - begin, type(wheels)(*(u[change] for u in wheels)), poses.t[new] + shift - begin, pose
     )
-    found = respond(streams)
+    return _checked(respond(streams), shift)
+
+
+def estimate_log_offset(log: Log) -> Response:
+    """As `estimate_offset`, for the poses of a finished log: one offset for all of its runs."""
+    return _checked(respond(streams_of_log(log)))
+
+
+def _checked(found: Response | None, shift: float = 0.0) -> Response:
+    """The response, its offset later by `shift`; InputError where it is none that can be relied on."""
     if found is None or np.max(found.explained) < SMALLEST_SHARE or not found.standard_error > 0.0:
         raise InputError(
             "pose_offset: the motion does not answer the commands, so no offset can be found; give a number"

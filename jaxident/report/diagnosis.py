@@ -8,10 +8,12 @@ from jaxident import plot
 from jaxident.diagnosis.account.judging import CHANNELS
 from jaxident.diagnosis.account.shrink import interval
 from jaxident.diagnosis.diagnose import DIFFERENT, Diagnosis
+from jaxident.origin import Origin
 from jaxident.report import causes, words
 from jaxident.report.account import account_section
 from jaxident.report.discovered import discovered
 from jaxident.report.lead import deviations, lead
+from jaxident.report.origin import origin_section
 from jaxident.report.page import Figure, Page, Section, Table
 from jaxident.report.words import (
     NOMINAL,
@@ -31,8 +33,8 @@ LISTED = 12
 """Regions that the table shows."""
 
 
-def diagnosis_page(found: Diagnosis, name: str) -> Page:
-    """The page of one diagnosis; `name` says of what, such as the logs' folder."""
+def diagnosis_page(found: Diagnosis, name: str, made: Origin | None = None) -> Page:
+    """The page of one diagnosis; `name` says of what, such as the logs' folder, and `made` by which command."""
     sections = [
         account_section(found.account),
         _gap(found),
@@ -43,6 +45,7 @@ def diagnosis_page(found: Diagnosis, name: str) -> Page:
         _parameters(found),
         causes.hidden(found),
         Section("What to do next", [found.next]),
+        *origin_section(made),
     ]
     return Page(f"Diagnosis of {name}", lead(found), sections, f"jaxident {version('jaxident')}")
 

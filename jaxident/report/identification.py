@@ -15,6 +15,7 @@ from jaxident.estimation.runs import stack_runs
 from jaxident.estimation.verdict import BORROWED, Verdict
 from jaxident.files.atomic import Target
 from jaxident.log import Log, join
+from jaxident.report.origin import origin_section
 from jaxident.report.page import Figure, Page, Section, Table, write_page
 
 if TYPE_CHECKING:
@@ -46,8 +47,9 @@ def _page(found: Identification, log: Log, verdicts: Sequence[Verdict], again: B
         Section("What it explains", [_percent_table(percent), _path(found, log)]),
         Section("What is left", [ABOUT_TESTS, _tests(normalised, runs), *_pictures(found, log, normalised, runs.seen)]),
     ]
-    origin = found.model.provenance
-    return Page("The robot behind the log", _lead(found, verdicts, percent), sections, f"jaxident {origin.version}")
+    told = found.model.provenance
+    sections += origin_section(told.origin)
+    return Page("The robot behind the log", _lead(found, verdicts, percent), sections, f"jaxident {told.version}")
 
 
 def _lead(found: Identification, verdicts: Sequence[Verdict], percent: np.ndarray) -> str:

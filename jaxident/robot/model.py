@@ -8,6 +8,7 @@ import jax.numpy as jnp
 
 from jaxident.array_types import Array
 from jaxident.errors import InputError
+from jaxident.origin import Origin
 from jaxident.robot.difference import Difference, to_difference
 from jaxident.robot.drive import Physical
 from jaxident.robot.noise import Noise
@@ -25,7 +26,8 @@ class Provenance(NamedTuple):
     """Where a model comes from. duration [s]: of all its logs, after which the session time goes on; runs: the mark by
     which each run is known again (`estimation.session`), and the session time [s] of its first row. from_prior: names
     of parameters that come mostly from what is known of robots in general, not from these logs. at_bound: names of
-    those that stand at a bound of their search."""
+    those that stand at a bound of their search. origin: the command that wrote the model, None for a model from
+    elsewhere."""
 
     version: str = ""
     method: str = ""
@@ -35,6 +37,7 @@ class Provenance(NamedTuple):
     runs: tuple[tuple[str, float], ...] = ()
     from_prior: tuple[str, ...] = ()
     at_bound: tuple[str, ...] = ()
+    origin: Origin | None = None
 
 
 class Spread(NamedTuple):

@@ -4,7 +4,6 @@ import dataclasses
 import statistics
 import time
 from collections.abc import Callable
-from importlib.metadata import version
 from typing import Any, NamedTuple
 
 import jax
@@ -18,6 +17,7 @@ from jaxident.estimation.observations import Observations, complete_observations
 from jaxident.estimation.runs import Runs
 from jaxident.log import Log, make_log
 from jaxident.numerics import require_float64
+from jaxident.origin import versions
 from jaxident.robot.drive import Physical
 from jaxident.robot.excitation import multilevel
 from jaxident.robot.model import Model, difference_vector, require_physical
@@ -191,7 +191,7 @@ def bench(robot: Model, *, trials: int = 1000, seed: int = 0) -> Bench:
         maximum_likelihood_ms=maximum_likelihood_ms(robot, keys[3]),
         compile_s=compile_s,
         devices=[str(device) for device in jax.devices()],
-        versions={name: version(name) for name in ("jaxident", "jax", "jaxlib", "numpy", "optimistix")},
+        versions=versions(),
     )
 
 

@@ -3,13 +3,13 @@
 import json
 import platform
 from collections.abc import Mapping, Sequence
-from importlib.metadata import version
 from typing import Any
 
 import jax
 import numpy as np
 import xarray
 
+from jaxident.origin import versions as of_packages
 from jaxident.robot.model import DIFFERENCE_ORDER, Effect
 from jaxident.study.design import PARTS, Study, check_study
 from jaxident.study.engine import chunks, run_locally
@@ -95,14 +95,14 @@ def provenance(study: Study) -> dict[str, str]:
     return {
         "title": study.name,
         "seed": str(study.seed),
-        "versions": json.dumps(versions()),
+        "versions": json.dumps(of_packages() | versions()),
         "study": json.dumps(describe(study)),
     }
 
 
 def versions() -> dict[str, str]:
-    """What a study's last bits depend on besides itself."""
-    packages = {name: version(name) for name in ("jaxident", "jax", "jaxlib", "optimistix", "numpy")}
+    """What a study's last bits depend on besides itself; the version of Python is no part of that."""
+    packages = {name: found for name, found in of_packages().items() if name != "python"}
     return packages | {"device": jax.default_backend(), "machine": platform.machine()}
 
 

@@ -1,6 +1,7 @@
 """`jaxident diagnose`, as a user runs it: quickly what it refuses, and slowly what it finds."""
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -102,3 +103,19 @@ def test_the_effect_of_an_example_is_found(tmp_path, effect):
     assert {path.name for path in out.iterdir()} == {
         "diagnosis.json", "nominal_model.json", "corrected_model.json", "report.html",
     }  # fmt: skip
+
+
+@pytest.mark.slow
+def test_the_same_logs_give_the_same_bytes_in_any_order_and_in_any_folder(tmp_path):
+    """Logs that are numbered, listed forwards and backwards."""
+    from jaxident.cli.example import command as example
+
+    assert CliRunner().invoke(example, ["--effect", "transport_delay", "--out", str(tmp_path / "a")]).exit_code == 0
+    shutil.copytree(tmp_path / "a", tmp_path / "b")
+    made = []
+    for folder, order in (("a", 1), ("b", -1)):
+        paths = sorted((tmp_path / folder).glob("real_*.csv"))[::order]
+        result = CliRunner().invoke(command, [*map(str, paths), "--out", str(tmp_path / folder / "out")])
+        assert result.exit_code == 0, result
+        made.append({path.name: path.read_bytes() for path in (tmp_path / folder / "out").iterdir()})
+    assert made[0] == made[1]

@@ -39,7 +39,7 @@ def test_help_names_every_command():
 def test_identify_writes_a_model_that_is_right(folder):
     model = load_model(folder / "model.json")
     assert model.physical is None
-    assert model.provenance.logs == (str(folder / "log.csv"),)
+    assert model.provenance.logs == ("log.csv",)
     np.testing.assert_allclose(model.alpha, [0.9821, 0.7706], atol=5e-3)
     np.testing.assert_allclose(model.dead_zone, [0.25, 0.2], atol=0.02)
     result = json.loads((folder / "result.json").read_text())

@@ -1,6 +1,7 @@
 """`jaxident sweep` as a user runs it; what takes long (kills, clusters, the example) is slow."""
 
 import csv
+import json
 import os
 import random
 import signal
@@ -74,6 +75,14 @@ def test_an_axis_of_effects(tmp_path):
     run("study.toml", "--out", "out", "--trial", 12, cwd=tmp_path)
     with xarray.open_zarr(tmp_path / "out" / "trials.zarr") as found:
         assert found["estimate"].sel(effect="none").size == len(rows) // 2 * 6
+
+
+def test_the_summary_tells_its_study(swept):
+    told = json.loads((swept / "out" / "summary.csv.provenance.json").read_text())["provenance"]
+    assert told["command"] == ["sweep", "study.toml"]
+    assert [one["name"] for one in told["inputs"]] == ["study.toml"]
+    with xarray.open_zarr(swept / "out" / "trials.zarr") as found:
+        assert json.loads(found.attrs["versions"]).items() >= told["versions"].items()
 
 
 def test_wrong_use(swept):

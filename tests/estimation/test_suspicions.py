@@ -101,7 +101,7 @@ def test_delays_of_several_rows(delay, rows):
         assert lines == ()
     else:
         assert "late: a delay" in lines[0]
-        assert f"`jaxident convert --pose-offset -{delay:g}" in lines[0]
+        assert f"`jaxident convert --log LOG --pose-offset -{delay:g}" in lines[0]
 
 
 @pytest.mark.parametrize("rows", [1, 3, 9])
@@ -110,7 +110,7 @@ def test_poses_of_a_clock_that_is_ahead(log, rows):
     early = log[:-rows]._replace(**{c: getattr(log, c)[rows:] for c in ("x", "y", "theta")})
     (line,) = said(early)
     assert "before it is told to: the poses have another clock" in line
-    offset = float(re.search(r"--pose-offset ([-0-9.]+)`", line)[1])
+    offset = float(re.search(r"--pose-offset ([-0-9.]+) ", line)[1])
     assert offset == pytest.approx(rows * ROBOT.sample_period, abs=0.004)
 
 

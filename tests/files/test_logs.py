@@ -279,3 +279,11 @@ def test_the_husky_log_reads(shared):
     assert len(log.t) == 24120
     assert all(np.allclose(np.diff(run.t), 0.05) for run in runs)
     assert np.isfinite(log.command).all()
+
+
+def test_numbered_logs_come_in_the_order_of_their_numbers_and_others_as_given():
+    first, second, tenth, evening = "run_1.csv", "run_2.csv", "run_10.csv", "evening.csv"
+    for given in ([first, tenth, second], [tenth, second, first]):
+        assert find_logs(given) == [first, second, tenth]
+    assert find_logs([tenth, evening, first]) == [tenth, evening, first]
+    assert find_logs([second, first, first]) == [second, first, first]

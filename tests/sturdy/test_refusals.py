@@ -222,7 +222,7 @@ def test_a_log_whose_name_is_no_text(log):
     name = b"l\xffg.csv"
     os.rename(log, os.path.join(os.fsencode(log.parent), name))
     ended = jaxident("simulate", "published", "--inputs", name, "--out", b"\xfe.csv", cwd=log.parent)
-    assert (ended.code, ended.out) == (0, "wrote \\udcfe.csv\n")
+    assert (ended.code, ended.out) == (0, "wrote \\udcfe.csv\nwrote \\udcfe.csv.provenance.json\n")
     origin = Provenance(logs=(os.fsdecode(name),))
     save_model(dataclasses.replace(load_model("published"), provenance=origin), log.parent / "m.json")
     assert os.fsencode(*load_model(log.parent / "m.json").provenance.logs) == name

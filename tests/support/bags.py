@@ -63,12 +63,12 @@ class Bag:
         turn = self.make("geometry_msgs/Quaternion", 0.0, 0.0, np.sin(0.5 * theta), np.cos(0.5 * theta))
         return self.make("geometry_msgs/Pose", self.make("geometry_msgs/Point", x, y, 0.0), turn)
 
-    def transform(self, stamp, child, x, y, theta):
+    def transform(self, stamp, child, x, y, theta, parent="map"):
         """geometry_msgs/TransformStamped."""
         pose = self.pose(x, y, theta)
         place = self.make("geometry_msgs/Vector3", x, y, 0.0)
         moved = self.make("geometry_msgs/Transform", place, pose.orientation)
-        return self.make("geometry_msgs/TransformStamped", self.header(stamp), child, moved)
+        return self.make("geometry_msgs/TransformStamped", self.header(stamp, parent), child, moved)
 
     def covered(self, pose, variances):
         """geometry_msgs/PoseWithCovariance with variances of x, y and yaw."""
