@@ -3,7 +3,7 @@
 import click
 
 from jaxident.cli.progress import working
-from jaxident.cli.session import json_option, write_json, wrote
+from jaxident.cli.session import check_outputs, json_option, write_json, wrote
 from jaxident.start import start_jax
 
 TARGETS = ("mjcf", "gazebo", "isaac", "ros2_control", "robot_localization", "c-header", "python", "table")
@@ -32,6 +32,7 @@ def command(model, target, out, wheel_radius, track, mass, limit, command_unit, 
     Example: jaxident export diagnosis/corrected_model.json --to mjcf --out robot.xml
     """
     start_jax()
+    check_outputs(out, json_file)
     from jaxident.export.export import commands_path, export
 
     with working("exporting"):
