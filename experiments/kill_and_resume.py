@@ -87,15 +87,21 @@ def left_over(out: pathlib.Path) -> int:
     return sum(1 for pattern in (".*.part", ".part-*", "*.partial") for _ in out.rglob(pattern))
 
 
-def one_soaked(study: pathlib.Path, out: pathlib.Path, seconds: float, moments: random.Random) -> tuple[int, int]:
-    """Kill and resume one study without pause until it ends; kills, and finished chunks that were lost."""
+def one_soaked(
+    study: pathlib.Path, out: pathlib.Path, seconds: float, moments: random.Random, end: float
+) -> tuple[int, int]:
+    """Kill and resume one study without pause until it ends; kills, and finished chunks that were lost.
+
+    After a kill that came before any new chunk, the next comes later: a machine that became busy would never get to the
+    end. After the moment `end` there is no kill.
+    """
     kills = lost = 0
     while True:
         before = kept_chunks(out)
         running = sweep(study, out)
         deadly = moments.choice([signal.SIGKILL, signal.SIGTERM])
         try:
-            running.wait(moments.uniform(0.3 * seconds, seconds))
+            running.wait(moments.uniform(0.3 * seconds, seconds) if time.monotonic() < end else None)
         except subprocess.TimeoutExpired:
             running.send_signal(deadly)
         kills += (code := running.wait()) != 0
@@ -103,6 +109,7 @@ def one_soaked(study: pathlib.Path, out: pathlib.Path, seconds: float, moments: 
             lost += len(before - kept_chunks(out))
         if code == 0:
             return kills, lost
+        seconds *= 1.0 if kept_chunks(out) - before else 1.5
         if code not in (-signal.SIGKILL, -signal.SIGTERM, 128 + signal.SIGTERM):
             raise SystemExit(f"{out}: the study ended with {code}")
 
@@ -112,7 +119,7 @@ def soak(study: pathlib.Path, folder: pathlib.Path, whole: xarray.Dataset, secon
     moments, end, found = random.Random(options.seed), time.monotonic() + options.soak, Soak()
     while time.monotonic() < end:
         out = folder / "soaked"
-        kills, lost = one_soaked(study, out, seconds, moments)
+        kills, lost = one_soaked(study, out, seconds, moments, end)
         found = Soak(
             found.studies + 1,
             found.kills + kills,
