@@ -99,7 +99,7 @@ def test_identify_under_some_stress():
 def test_a_recursion_under_stress():
     """From a sound start through a stressed log: the state stays finite, its variances positive."""
     step = jax.jit(recursive.step)
-    for _, stress, log in cases(30):
+    for _, stress, log in cases(8):
         largest = float(np.nanmax(np.abs(np.stack(log.command))))
         state = recursive.init(log[:80], d_max=0.9 * largest)
         if not finite(state):
@@ -115,7 +115,7 @@ def test_a_recursion_under_stress():
 def test_a_joint_filter_under_stress():
     """Every estimate is finite, within its bounds, with a covariance that is one; what is lost is not ok."""
     step = jax.jit(joint_filter.step)
-    for _, stress, log in cases(30):
+    for _, stress, log in cases(8):
         largest = 0.9 * float(np.nanmax(np.abs(np.stack(log.command))))
         state = joint_filter.init(log[:80], d_max=largest)
         for row in range(80, ROWS):
@@ -131,7 +131,7 @@ def test_a_joint_filter_under_stress():
 @pytest.mark.slow
 def test_predictions_under_stress():
     """Of the true robot in the log's own units: each row is finite, or counted as failed."""
-    for robot, stress, log in cases(30):
+    for robot, stress, log in cases(8):
         gain = robot.physical.gain * np.array([[stress.pose_scale], [1.0]]) / stress.command_scale
         drive, zones = robot.physical._replace(gain=gain), robot.dead_zone * stress.command_scale
         model = ji.Model(stress.period, drive, zones)
