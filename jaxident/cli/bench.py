@@ -4,7 +4,7 @@ import click
 
 from jaxident.cli.progress import working
 from jaxident.cli.record import Recorded, origin, with_provenance
-from jaxident.cli.session import json_option, seed_option, table, write_json
+from jaxident.cli.session import check_outputs, json_option, seed_option, table, write_json
 from jaxident.start import start_jax
 
 
@@ -23,6 +23,7 @@ def command(trials, seed, json_file):
     Example: jaxident bench --json bench.json
     """
     start_jax()
+    check_outputs(json_file)
     from jaxident.files.models import load_model
     from jaxident.study.bench import bench
 

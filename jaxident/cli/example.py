@@ -7,8 +7,10 @@ import click
 
 from jaxident.cli.progress import working
 from jaxident.cli.record import Recorded, origin
-from jaxident.cli.session import seed_option, wrote
+from jaxident.cli.session import check_outputs, seed_option, wrote
 from jaxident.start import start_jax
+
+OUTPUTS = (*(f"real_{number}.csv" for number in range(1, 7)), ".answer.json")
 
 
 @click.command("example", cls=Recorded)
@@ -36,6 +38,7 @@ def command(out, effect, seed):
     robot = example_robot(key_robot, load_model("published"))
     robot = draw_effect(jax.random.fold_in(key_robot, 1), robot, effect)
     make_folder(out)
+    check_outputs(*(os.path.join(out, name) for name in OUTPUTS))
     with working("simulating"):
         runs = example_runs(key_runs, robot)
     for number, run in enumerate(runs, start=1):

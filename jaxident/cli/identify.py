@@ -24,7 +24,8 @@ from jaxident.start import start_jax
 MOST_REFITS = 100_000
 """Refits of a bootstrap; more than some thousands move an interval's ends by nothing."""
 NOTES = {
-    "paper": "Intervals take the equation error for white. Camera noise makes it coloured and biases these estimates: "
+    "paper": "Intervals take the equation error for white. Camera noise makes it coloured and biases these estimates. "
+    "An interval is the wider where as much noise again, added to the poses, moves its number beyond chance: "
     "see experiments/validation.md, 'Estimates and their intervals'.",
     "instrumental-variables": "Intervals take the filtered equation error for white. Camera noise makes path lengths "
     "longer than the path, which biases what is estimated from them.",

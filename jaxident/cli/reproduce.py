@@ -6,7 +6,7 @@ import click
 
 from jaxident.cli.progress import working
 from jaxident.cli.record import Recorded, origin, with_provenance
-from jaxident.cli.session import json_option, seed_option, table, write_json, wrote
+from jaxident.cli.session import check_outputs, json_option, seed_option, table, write_json, wrote
 from jaxident.start import start_jax
 
 TABLE = "table.json"
@@ -31,7 +31,9 @@ def command(out, seeds, seed, json_file):
     from jaxident.report.reproduction import write_reproduction
     from jaxident.study.reproduction import reproduce, table_rows
 
+    check_outputs(json_file)
     make_folder(out)
+    check_outputs(os.path.join(out, "table.json"), os.path.join(out, "index.html"))
     with working("reproducing the paper's experiment"):
         result = reproduce(load_model("published"), load_model("published-simplified"), seed=seed, seeds=seeds)
         paths = write_reproduction(result, out)  # while the noise study still computes

@@ -6,6 +6,9 @@ from jaxident.errors import InputError
 from jaxident.log import Log
 from jaxident.rules import check_pose_rate
 
+LOST_HEADING = 1.5
+"""Root-mean-square turn [rad] from pose to pose beyond which nobody knows which way the robot turned; headings at
+random give 1.81."""
 STILL_RATIO = 2.0
 """A robot that moves is displaced over many rows by more than this times its row-to-row camera error."""
 
@@ -19,8 +22,21 @@ def check_informative(log: Log) -> None:
         raise InputError(f"{np.count_nonzero(seen)} measured poses: at least 3 are needed to see any motion")
     if all(np.ptp(np.asarray(u)) == 0.0 for u in log.command):
         raise InputError("no excitation: both commands are constant, so nothing shows how the robot answers them")
+    turn = _turn(log, seen)
+    if turn > LOST_HEADING:
+        raise InputError(
+            f"the headings turn by {turn:.2g} rad from pose to pose (root mean square), where headings at random turn "
+            "by 1.8 rad: they are noise, in another unit, or of a robot that turns faster than the camera sees"
+        )
     if not moves(log, seen):
         raise InputError("nothing moves: the poses are at rest within the camera's noise while the commands change")
+
+
+def _turn(log: Log, seen: np.ndarray) -> float:
+    """Root-mean-square turn [rad] between poses that follow each other, each within half a turn."""
+    runs = Log(*(np.asarray(column)[seen] for column in log)).runs()
+    turns = np.concatenate([np.diff(run.theta) for run in runs])
+    return float(np.sqrt(np.mean(((turns + np.pi) % (2.0 * np.pi) - np.pi) ** 2))) if turns.size else 0.0
 
 
 def moves(log: Log, seen: np.ndarray) -> bool:

@@ -1,24 +1,22 @@
 """One identification from start to end: logs in, model out."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxident.array_types import Array, Increment, Pose, Wheels
+from jaxident.array_types import Array, Increment, Pose
 from jaxident.errors import InputError, WorkError
 from jaxident.estimation import recursive
 from jaxident.estimation.checks import check_informative
 from jaxident.estimation.identify_batch import YARDSTICKS, identify_batch
 from jaxident.estimation.identify_poses import identify_poses
-from jaxident.estimation.initialise import Setup, initialise
-from jaxident.estimation.least_squares import full_covariance
+from jaxident.estimation.identify_recursive import identify_recursively
 from jaxident.estimation.maximum_likelihood import Fit
-from jaxident.estimation.observations import observe_log
+from jaxident.estimation.more_noise import camera_error, moves
 from jaxident.estimation.suspicions import log_suspicions
 from jaxident.estimation.verdict import at_bound, bound_doubts
 from jaxident.log import Log, even_period, join
@@ -31,15 +29,6 @@ SETUP_SAMPLES = 200
 SETUP_SHARE = 0.3
 SMALLEST_LOG = 20
 D_MAX_SHARE = 0.9
-
-
-class History(NamedTuple):
-    """The recursion after each sample (samples,): parameters in DIFFERENCE_ORDER and their standard deviations, each
-    (samples, 12), and what the sample taught."""
-
-    parameters: Any
-    standard_deviation: Any
-    used: Any
 
 
 class Identification(NamedTuple):
@@ -91,15 +80,44 @@ def identify(
     largest = float(np.nanmax(np.abs(np.stack(log.command))))
     d_max = D_MAX_SHARE * largest if d_max is None else d_max
     check_settings(1.0 if forgetting is None else forgetting, d_max, largest)
-    if method == "paper":
+    if method != "maximum-likelihood":
         settings = setup_time, 1.0 if forgetting is None else forgetting, reading or "one_step"
-        paper = _identify_as_paper(log, d_max, *settings)
-        return _with_bounds(paper._replace(suspicions=log_suspicions(log)), d_max)
-    if method in YARDSTICKS:
-        return _with_bounds(_identify_by_yardstick(log, method, d_max)._replace(suspicions=log_suspicions(log)), d_max)
+        again = (
+            partial(_identify_by_yardstick, method=method, d_max=d_max)
+            if method in YARDSTICKS
+            else partial(_identify_as_paper, d_max=d_max, settings=settings)
+        )
+        stepwise = _with_moves(again(log), log, again)
+        return _with_bounds(stepwise._replace(suspicions=log_suspicions(log)), d_max)
     found = identify_poses(log, d_max, noise_law, coupling)
     every = found.model, found.model.covariance, found.residuals, found.fit.ok
     return _with_bounds(Identification(*every, fit=found.fit, suspicions=found.suspicions), d_max)
+
+
+def _with_moves(found: Identification, log: Log, again: Callable[[Log], Identification]) -> Identification:
+    """The identification, each variance the wider by the square of how far as much camera error again moves its number
+    (`more_noise`)."""
+
+    def vector(log: Log) -> np.ndarray:
+        found = again(log)
+        if not bool(found.ok):
+            raise WorkError("no convergence")
+        return _vector(found)
+
+    if not bool(found.ok):
+        return found
+    deviation = np.sqrt(np.diagonal(found.covariance))
+    error = camera_error(Increment(*found.residuals[:2]), found.model.difference.alpha)
+    moved = moves(vector, log, _vector(found), deviation, error)
+    covariance = jnp.asarray(np.asarray(found.covariance) + np.diag(moved**2))
+    spread = _spread(jnp.sqrt(jnp.diagonal(covariance)))
+    model = dataclasses.replace(found.model, covariance=covariance, standard_deviation=spread)
+    return found._replace(model=model, covariance=covariance)
+
+
+def _vector(found: Identification) -> np.ndarray:
+    """The numbers (12,) of a model of the difference equations, in DIFFERENCE_ORDER."""
+    return np.asarray(difference_vector(found.model.difference, found.model.dead_zone))
 
 
 def _with_bounds(found: Identification, d_max: float) -> Identification:
@@ -120,9 +138,8 @@ def _check_method(method: str, coupling: bool, of_the_paper: dict[str, Any]) -> 
         raise InputError(f"{given[0]}: a setting of the method 'paper'; {method} has none such")
 
 
-def _identify_as_paper(
-    log: Log, d_max: float, setup_time: float | None, forgetting: float, reading: str
-) -> Identification:
+def _identify_as_paper(log: Log, d_max: float, settings: tuple[float | None, float, str]) -> Identification:
+    setup_time, forgetting, reading = settings
     period = even_period(log)
     setup_rows = count_setup_rows(log, period, setup_time)
     estimate, setup, history, residuals, covariance = identify_recursively(
@@ -174,65 +191,6 @@ def count_setup_rows(log: Log, period: float, setup_time: float | None) -> int:
     if setup_time < SMALLEST_LOG * period:
         raise InputError(f"setup time {setup_time:g} s: at least {SMALLEST_LOG} samples, {SMALLEST_LOG * period:g} s")
     return min(rows, round(setup_time / period))
-
-
-@partial(jax.jit, static_argnames=("setup_rows", "reading"))
-def identify_recursively(log: Log, setup_rows: int, d_max: Array, forgetting: Array, reading: str):
-    """Section VI on the first rows, then the recursion over the rest: pure, for one log of arrays (samples,).
-
-    Returns the last estimate, the setup, the history and residuals after the setup, and the covariance (12, 12).
-    """
-    observations = observe_log(log)
-    early = jax.tree.map(lambda column: column[: setup_rows - 1], observations)
-    setup = initialise(early, d_max=d_max, reading=reading)
-    estimate = recursive.start(setup.difference, setup.dead_zone, early, d_max, forgetting)
-    late = recursive.tail(observations, setup_rows - 1)
-    estimate, (steps, info) = recursive.run(estimate, late)
-    variance = _noise_variance(info, setup)
-    parameters, deviations = jax.vmap(lambda one: _summary(one, variance))(steps)
-    history = History(parameters, deviations, info.used)
-    covariance = parameter_covariance(estimate, variance)
-    residuals = Increment(*(jnp.where(info.used, e, jnp.nan) for e in info.error))
-    return estimate, setup, history, residuals, covariance
-
-
-def _noise_variance(info: recursive.Info, setup: Setup) -> Increment:
-    """Variance of each equation's error, from the normalised prediction errors; the setup's where none followed."""
-    used = jnp.sum(info.used)
-    return Increment(
-        *(
-            jnp.where(used > 0, jnp.sum(jnp.where(info.used, e**2 / s, 0.0)) / jnp.maximum(used, 1), w**2)
-            for e, s, w in zip(info.error, info.scale, setup.weight, strict=True)
-        )
-    )
-
-
-def parameter_covariance(estimate: recursive.Estimate, variance: Increment) -> Array:
-    """Covariance (12, 12) in DIFFERENCE_ORDER: that of both equations' unknowns, carried to first order.
-
-    The dead zones enter as the unbounded average: at a bound the clipped one would claim to be certain.
-    """
-
-    def from_unknowns(unknowns):
-        length, turn = (e._replace(unknowns=u) for e, u in zip((estimate.length, estimate.turn), unknowns, strict=True))
-        moved = estimate._replace(length=length, turn=turn)
-        ratios = recursive.dead_zone_ratios(moved)
-        average = Wheels(*(0.5 * (first + second) for first, second in zip(*ratios, strict=True)))
-        return difference_vector(*recursive.parameters(moved._replace(dead_zone=average)))
-
-    unknowns = (estimate.length.unknowns, estimate.turn.unknowns)
-    slopes = jax.jacfwd(from_unknowns)(unknowns)
-    total = 0.0
-    for slope, equation, v in zip(slopes, (estimate.length, estimate.turn), variance, strict=True):
-        columns = jnp.stack(slope, axis=-1)
-        total = total + v * columns @ full_covariance(equation) @ columns.T
-    return total
-
-
-def _summary(estimate: recursive.Estimate, variance: Increment) -> tuple[Array, Array]:
-    return difference_vector(*recursive.parameters(estimate)), jnp.sqrt(
-        jnp.maximum(jnp.diagonal(parameter_covariance(estimate, variance)), 0.0)
-    )
 
 
 def _spread(deviation: Array) -> Spread:

@@ -24,7 +24,8 @@ Target = str | os.PathLike[str]
 
 GZIP_LEVEL = 6
 FRESH = 2.0
-"""Seconds in which a hidden file is nobody's left-over: it may be about to be locked."""
+"""Seconds in which a hidden file is nobody's left-over: it may be about to be locked. One from the future is old: the
+clock was set back."""
 _PART = re.compile(r"\.[0-9a-f]{16}\.part")
 _FAILED_WORK = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
 
@@ -110,7 +111,7 @@ def _remove_left(folder: pathlib.Path) -> None:
         if not (_PART.fullmatch(left.name) and left.is_file() and not left.is_symlink()):
             continue
         with contextlib.suppress(OSError), open(left, "rb") as raw:
-            if _lock(raw) and time.time() - os.fstat(raw.fileno()).st_mtime > FRESH:
+            if _lock(raw) and abs(time.time() - os.fstat(raw.fileno()).st_mtime) > FRESH:
                 left.unlink()
 
 

@@ -15,7 +15,8 @@ from jaxident.array_types import Array, Increment, Pose, Wheels
 from jaxident.errors import InputError
 from jaxident.estimation import recursive
 from jaxident.estimation.batch_covariance import batch_covariance
-from jaxident.estimation.identify import D_MAX_SHARE, SETUP_SAMPLES, SETUP_SHARE, SMALLEST_LOG, parameter_covariance
+from jaxident.estimation.identify import D_MAX_SHARE, SETUP_SAMPLES, SETUP_SHARE, SMALLEST_LOG
+from jaxident.estimation.identify_recursive import parameter_covariance
 from jaxident.estimation.initialise import Setup, initialise
 from jaxident.estimation.instrumental import fit_instrumental
 from jaxident.estimation.key_term_fit import Batch, fit_key_terms

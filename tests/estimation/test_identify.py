@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from jaxident.errors import InputError
-from jaxident.estimation.identify import identify, identify_recursively
+from jaxident.estimation.identify import identify
+from jaxident.estimation.identify_recursive import identify_recursively
 from jaxident.files.models import load_model
 from jaxident.log import Log
 from jaxident.robot.model import difference_vector

@@ -202,6 +202,10 @@ def test_an_option_beyond_all_bounds_is_named(log, words):
         ("simulate", "published", "--excitation", "prbs", "--samples", "50", "--out"),
         ("plan", "published", "--between", "motor_lag,play", "--out"),
         ("convert", "--commands", "log.csv", "--poses", "log.csv", "--out"),
+        ("export", "published", "--to", "table", "--out"),
+        ("export", "published", "--to", "table", "--out", "out.txt", "--json"),
+        ("bench", "--json"),
+        ("reproduce", "--json"),
     ],
 )
 def test_an_output_that_cannot_be_written_is_told_before_the_work(log, words, monkeypatch):
@@ -209,6 +213,12 @@ def test_an_output_that_cannot_be_written_is_told_before_the_work(log, words, mo
     log.unlink()
     monkeypatch.setattr("jaxident.files.models.load_model", lambda path: pytest.fail("the work began"))
     refused(jaxident(*words, "none/file", cwd=log.parent), "none/file: the folder none does not exist")
+
+
+def test_example_looks_at_its_folder_before_it_writes(log):
+    (log.parent / "out" / ".answer.json").mkdir(parents=True)
+    refused(jaxident("example", "--effect", "none", "--out", "out", cwd=log.parent), ".answer.json: is a folder")
+    assert os.listdir(log.parent / "out") == [".answer.json"]
 
 
 def test_diagnose_looks_at_its_folder_before_the_work(log):
@@ -259,6 +269,14 @@ def test_the_next_call_removes_what_a_killed_one_left(tmp_path, monkeypatch):
         atomic.write_text(tmp_path / "c", "whole")
         assert len(list(tmp_path.glob(".*.part"))) == 1
         living.terminate()
+    atomic.write_text(tmp_path / "c", "whole")
+    assert os.listdir(tmp_path) == ["c"]
+
+
+def test_a_left_over_is_removed_although_the_clock_was_set_back(tmp_path):
+    left = tmp_path / ".0123456789abcdef.part"
+    left.write_text("half")
+    os.utime(left, (time.time() + 86400.0,) * 2)
     atomic.write_text(tmp_path / "c", "whole")
     assert os.listdir(tmp_path) == ["c"]
 
