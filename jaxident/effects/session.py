@@ -71,7 +71,7 @@ RECORDS = (
                       Transform(lambda c: {"ratio": 1.0 / (1.0 - c["loss"]), "instant": float(c["instant"])},
                                 lambda p: {"loss": 1.0 - 1.0 / p["ratio"], "instant": p["instant"]}),
                       lambda duration: [{"loss": 0.1, "instant": duration * part}
-                                        for part in np.linspace(0.06, 0.94, 12)]),
+                                        for part in np.linspace(0.2, 0.8, 12)]),
     ),
 )  # fmt: skip
 """The effects of this site."""

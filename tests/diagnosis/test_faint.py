@@ -9,8 +9,8 @@ from support.small_robot import LAW, ROWS, RUNS, VECTOR, nominal_fit, windows_of
 from jaxident.diagnosis.causes.columns import tabulate
 from jaxident.diagnosis.causes.lost import find_lost, gain_beyond
 from jaxident.diagnosis.causes.moves import fit_options, stands
-from jaxident.diagnosis.causes.points import at_best
-from jaxident.diagnosis.causes.refit import best_starts, refit
+from jaxident.diagnosis.causes.points import at_best, points_of
+from jaxident.diagnosis.causes.refit import EDGE, best_starts, bounds, refit
 from jaxident.diagnosis.causes.rhythm import _travels, rhythms
 from jaxident.diagnosis.causes.search import best_set
 from jaxident.diagnosis.causes.steps import likely_steps
@@ -62,6 +62,22 @@ def test_a_payload_is_placed_where_it_came():
     held = (("payload_change", "instant"),)
     first = refit(data, begin, nominal.starts, ("payload_change",), held, most=4)
     assert abs(at_best(data, first, ("payload_change", "instant"))[place] - 13.3) < 0.3
+
+
+def test_no_payload_is_placed_near_an_end_of_the_session():
+    """It came 2 s before the end of 29 s. What so few windows tell would foretell all that follows."""
+    vector, session = VECTOR.copy(), RUNS * ROWS * 0.03
+    place = PLACES["payload_change", "instant"]
+    vector[PLACES["payload_change", "loss"]], vector[place] = 0.4, session - 2.0
+    data, nominal = nominal_fit(windows_of(vector))
+    latest = bounds(data.windows)[1][place]
+    assert latest == pytest.approx((1.0 - EDGE) * session, rel=0.01)
+    assert all(point["instant"] <= latest for point in points_of("payload_change", data, nominal))
+    begin = nominal.vector.copy()
+    begin[PLACES["payload_change", "loss"]], begin[place] = 0.4, session - 2.5
+    fit = refit(data, begin, nominal.starts, ("payload_change",))
+    assert fit.vector[place] <= latest
+    assert at_best(data, fit, ("payload_change", "instant"))[place] <= latest
 
 
 def test_a_step_is_settled_to_where_commands_round_alike():

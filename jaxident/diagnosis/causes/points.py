@@ -3,7 +3,7 @@
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.refit import Data, Solution
+from jaxident.diagnosis.causes.refit import Data, Solution, bounds
 from jaxident.diagnosis.causes.steps import likely_steps
 from jaxident.diagnosis.motion.linear import follow, gram, left_over
 from jaxident.effects.coordinates import (
@@ -62,12 +62,13 @@ def differences(data: Data, solution: Solution, vectors: list[np.ndarray]) -> np
 def at_best(data: Data, solution: Solution, pair: tuple[str, str]) -> np.ndarray:
     """The vector of a solution with one coordinate, an instant or a step, where it fits best, all else following
     linearly: -log p has a valley in every window, or jumps wherever a command rounds to another tooth."""
-    place, base = PLACES[pair], len(solution.places)
+    place, base, (low, high) = PLACES[pair], len(solution.places), bounds(data.windows)
     best = np.array(solution.vector)
     reach = np.array(REACHED[pair].reach)
     for span in best[place] * reach if REACHED[pair].relative else reach:
         vectors = np.tile(best, (17, 1))
         vectors[:, place] += span * np.linspace(-1.0, 1.0, len(vectors))
+        vectors[:, place] = np.clip(vectors[:, place], low[place], high[place])
         lanes = np.broadcast_to(solution.starts, (len(vectors), *solution.starts.shape))
         found = np.moveaxis(follow(vectors, lanes, data.windows), 0, -1)
         columns = np.concatenate([solution.linear.slopes, found], axis=2)

@@ -8,7 +8,7 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.causes.alike import unlikeliness, with_prior
 from jaxident.diagnosis.motion.linear import Linear, follow, gram, linearise, normal
 from jaxident.diagnosis.motion.windows import Windows
-from jaxident.effects.coordinates import NOMINAL, PLACES, STEPPED, free_places, limits, neutral_vector
+from jaxident.effects.coordinates import NOMINAL, PLACES, REACHED, STEPPED, free_places, limits, neutral_vector
 from jaxident.effects.discovered import Laws
 
 MOST_STEPS = 20
@@ -17,6 +17,11 @@ ENOUGH = 0.05
 """Promised fall of -log p below which the search ends."""
 LONGEST = 0.5
 """A step changes a rate by at most this much, as a logarithm."""
+EDGE = 0.2
+"""Part of a session, at its begin and at its end, in which no change at an instant is looked for: few windows tell it,
+and it foretells all that follows. On half a log of a Create, a load that changed 19 s before the end of 443 s took the
+error 10 s ahead on the other half from 41 to 107 mm."""
+INSTANTS = [PLACES[pair] for pair, coordinate in REACHED.items() if not coordinate.relative]
 PARTS = (1.0, 0.25, 0.0)
 """Of the step of a window's start state that are tried."""
 
@@ -47,7 +52,8 @@ def refit(data: Data, vector: Array, starts: Array, effects: tuple[str, ...], ho
     held = {PLACES[pair] for pair in {*hold, *STEPPED}}
     places = [place for place in free_places(effects) if place not in held]
     vector, starts = np.array(vector), np.array(starts)
-    low, high = (bound[places] for bound in limits())
+    low, high = (bound[places] for bound in bounds(data.windows))
+    vector[places] = np.clip(vector[places], low, high)
     linear, products, solve = _around(data, vector, starts, places)
     if not np.all(np.isfinite(products)):  # another robot's sizes: with these one would run away
         vector = neutral_vector(vector[: len(NOMINAL)])
@@ -75,6 +81,14 @@ def refit(data: Data, vector: Array, starts: Array, effects: tuple[str, ...], ho
             if damping > 1e6:
                 break
     return Solution(vector, starts, places, linear, cost, covariance_from(products), step_number)
+
+
+def bounds(windows: Windows) -> tuple[np.ndarray, np.ndarray]:
+    """The lowest and highest vector (SIZE,) of a search on some windows."""
+    low, high = limits()
+    session = float(windows.session[-1] + windows.t[-1, -1])
+    low[INSTANTS], high[INSTANTS] = EDGE * session, (1.0 - EDGE) * session
+    return low, high
 
 
 def _around(data: Data, vector: Array, starts: Array, places: list[int]) -> tuple[Linear, np.ndarray, np.ndarray]:
