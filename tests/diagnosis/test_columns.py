@@ -264,3 +264,11 @@ def test_a_point_at_which_the_robot_runs_away_answers_nothing(plain):
     kept = _answers(data, nominal, columns)[0]
     assert not kept[..., 0].any()
     np.testing.assert_array_equal(kept[..., 1], answers[..., 1])
+
+
+def test_a_free_column_that_answers_nothing_takes_nothing(plain):
+    """A term that a window never sees left a table of NaN, on which a search finds nothing."""
+    data, nominal, table = plain
+    empty = np.zeros((*nominal.linear.residual.shape, 1))
+    found = tabulate(data, nominal, (), empty, free=True)
+    np.testing.assert_allclose(found.cross, table.cross, rtol=1e-6, atol=1e-6 * np.abs(table.cross).max())

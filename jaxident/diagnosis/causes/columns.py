@@ -166,7 +166,8 @@ def _eliminated(fit: Solution, products: Array, cross: Array, count: int) -> tup
     summed[:-1, :-1], summed[:-1, -1] = products.sum(axis=0), cross.sum(axis=0)
     summed = with_prior(summed, fit.vector)
     whole, right = summed[:-1, :-1], summed[:-1, -1]
-    length = np.sqrt(np.maximum(np.diagonal(whole)[:count], 1e-300))
+    squares = np.diagonal(whole)[:count]
+    length = np.sqrt(np.where(squares > 1e-200, squares, 1.0))  # a column that answers nothing takes nothing
     own = whole[:count, :count] / length[:, None] / length + 1e-10 * np.eye(count)
     inverse = np.linalg.inv(own) / length[:, None] / length
     turn = np.concatenate([-whole[count:, :count] @ inverse, np.eye(len(whole) - count)], axis=1)
