@@ -3,6 +3,7 @@
 import numpy as np
 
 from jaxident.errors import InputError
+from jaxident.estimation.suspicions import misread_heading
 from jaxident.log import Log
 from jaxident.rules import check_pose_rate
 
@@ -23,10 +24,10 @@ def check_informative(log: Log) -> None:
     if all(np.ptp(np.asarray(u)) == 0.0 for u in log.command):
         raise InputError("no excitation: both commands are constant, so nothing shows how the robot answers them")
     turn = _turn(log, seen)
-    if turn > LOST_HEADING:
+    if turn > LOST_HEADING and "degrees" not in misread_heading(log):  # these are told, and fitted
         raise InputError(
             f"the headings turn by {turn:.2g} rad from pose to pose (root mean square), where headings at random turn "
-            "by 1.8 rad: they are noise, in another unit, or of a robot that turns faster than the camera sees"
+            "by 1.8 rad: they are noise, or of a robot that turns faster than the camera sees"
         )
     if not moves(log, seen):
         raise InputError("nothing moves: the poses are at rest within the camera's noise while the commands change")

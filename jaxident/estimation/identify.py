@@ -81,14 +81,11 @@ def identify(
     d_max = D_MAX_SHARE * largest if d_max is None else d_max
     check_settings(1.0 if forgetting is None else forgetting, d_max, largest)
     if method != "maximum-likelihood":
-        settings = setup_time, 1.0 if forgetting is None else forgetting, reading or "one_step"
-        again = (
-            partial(_identify_by_yardstick, method=method, d_max=d_max)
-            if method in YARDSTICKS
-            else partial(_identify_as_paper, d_max=d_max, settings=settings)
-        )
-        stepwise = _with_moves(again(log), log, again)
-        return _with_bounds(stepwise._replace(suspicions=log_suspicions(log)), d_max)
+        again = partial(_identify_by_yardstick, method=method, d_max=d_max)
+        if method not in YARDSTICKS:
+            settings = setup_time, 1.0 if forgetting is None else forgetting, reading or "one_step"
+            again = partial(_identify_as_paper, d_max=d_max, settings=settings)
+        return _with_bounds(_with_moves(again(log), log, again)._replace(suspicions=log_suspicions(log)), d_max)
     found = identify_poses(log, d_max, noise_law, coupling)
     every = found.model, found.model.covariance, found.residuals, found.fit.ok
     return _with_bounds(Identification(*every, fit=found.fit, suspicions=found.suspicions), d_max)

