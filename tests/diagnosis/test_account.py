@@ -116,6 +116,7 @@ LAWS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", LAWS)
 def test_the_floor_is_what_a_true_model_misses_by(kind):
     """216 starts of 24 runs, three channels: a mean square of white errors has a standard error of 6 %, of rare

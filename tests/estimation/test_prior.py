@@ -68,6 +68,7 @@ def prior(held=(False, False)):
     return no_prior()._replace(speed=jnp.asarray(0.3), weight=jnp.asarray(1.0), held=jnp.array(held))
 
 
+@pytest.mark.slow
 def test_prior_changes_nothing_where_poses_speak():
     """1000 poses: every estimate moves by less than a hundredth of its deviation (0.002 here), which stays as it is."""
 
