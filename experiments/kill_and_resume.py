@@ -25,25 +25,16 @@ import xarray
 
 STUDY = """
 name = "killed"
-seeds = 600
+seeds = {seeds}
 noise = [1e-6, 1e-5, 1e-4]
-samples = [100]
+samples = [{samples}]
 hold = 4
-chunk = 20
-robots = [{ model = "published" }]
-estimators = ["batch", "recursive"]
+chunk = {chunk}
+robots = [{{ model = "published" }}]
+estimators = {estimators}
 """
-
-SMALL = """
-name = "killed"
-seeds = 200
-noise = [1e-6, 1e-5, 1e-4]
-samples = [50]
-hold = 4
-chunk = 10
-robots = [{ model = "published" }]
-estimators = ["recursive"]
-"""
+LONG = STUDY.format(seeds=600, samples=100, chunk=20, estimators='["batch", "recursive"]')
+SHORT = STUDY.format(seeds=200, samples=50, chunk=10, estimators='["recursive"]')
 """What a soak runs: a study that is over soon, so that many end."""
 
 
@@ -143,7 +134,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as place:
         folder = pathlib.Path(place)
         study = folder / "study.toml"
-        study.write_text(SMALL if options.soak else STUDY)
+        study.write_text(SHORT if options.soak else LONG)
         finish(study, folder / "first")  # compiles
         seconds = finish(study, folder / "whole")
         whole = xarray.open_zarr(folder / "whole" / "trials.zarr").load()

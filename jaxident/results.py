@@ -50,7 +50,7 @@ class Identification(identifying.Identification):
         self.plot(ax)
         picture = Figure(plot.image(figure), "measured and modelled path")
         table = Table(COLUMNS, [row.cells() for row in self.verdicts])
-        return fragment([_counted(self), picture, table])
+        return fragment([_counted(self), picture, table, *self.suspicions])
 
     def to_dataframe(self) -> Any:
         """The parameters as a pandas data frame: estimate, low and high end of the 95 % interval, verdict, reason."""
@@ -108,7 +108,8 @@ class Diagnosis(diagnosing.Diagnosis):
         return draw_account(self.account, ax)
 
     def save(self, folder: str | os.PathLike) -> None:
-        """Write diagnosis.json, both models and report.html to a folder, as `jaxident diagnose --out` does."""
+        """Write diagnosis.json, both models and report.html to a folder, as `jaxident diagnose --out` does, but for
+        their origin: only a command knows from which files it was called."""
         make_folder(folder)
         save_model(self.nominal_model, os.path.join(folder, "nominal_model.json"))
         save_model(self.corrected_model, os.path.join(folder, "corrected_model.json"))

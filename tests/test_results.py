@@ -80,4 +80,6 @@ def test_a_diagnosis_writes_what_the_command_writes(tmp_path):
 
 
 def test_what_stands_in_a_notebook_is_escaped(identified):
-    assert "<script>" not in identified._replace(suspicions=("<script>",))._repr_html_()
+    shown = identified._replace(suspicions=("<script>",))._repr_html_()
+    assert "<script>" not in shown
+    assert "&lt;script&gt;" in shown

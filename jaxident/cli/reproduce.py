@@ -33,7 +33,7 @@ def command(out, seeds, seed, json_file):
 
     check_outputs(json_file)
     make_folder(out)
-    check_outputs(os.path.join(out, "table.json"), os.path.join(out, "index.html"))
+    check_outputs(os.path.join(out, TABLE), os.path.join(out, "index.html"))
     with working("reproducing the paper's experiment"):
         result = reproduce(load_model("published"), load_model("published-simplified"), seed=seed, seeds=seeds)
         paths = write_reproduction(result, out)  # while the noise study still computes

@@ -38,8 +38,8 @@ LISTED = 20
 
 @click.command("rerun")
 @click.argument("file", metavar="FILE")
-@click.option("--data", "folders", multiple=True, metavar="FOLDER", help="Where the inputs now lie (repeatable; "
-              "default: here, beside FILE, and one folder further).")  # fmt: skip
+@click.option("--data", "folders", multiple=True, metavar="FOLDER", help="Where inputs now lie (repeatable); after it "
+              "they are looked for here, beside FILE, and one folder further.")  # fmt: skip
 @click.option("--out", metavar="DIR", help="Keep the new outputs in this folder; without it they are only compared.")
 @json_option
 def command(file, folders, out, json_file):
@@ -58,7 +58,7 @@ def command(file, folders, out, json_file):
             raise InputError(f"--data {folder}: is no folder")
     path, origin = read_origin(file)
     check_outputs(json_file)
-    words = _words(path, origin, folders or _near(path))
+    words = _words(path, origin, [*folders, *_near(path)])
     with _folder(out, path) as place:
         target, outputs = _outputs(path, origin, place)
         click.echo(one_line(shlex.join(["jaxident", *origin.command])))

@@ -54,6 +54,12 @@ BOTH = (ALONG, HEADING)
 EVERYWHERE = (ALONG, LATERAL, HEADING)
 
 
+EDGE = 0.2
+"""Part of a session, at its begin and at its end, in which no change at an instant is looked for: few windows tell it,
+and it foretells all that follows. On half a log of a Create, a load that changed 19 s before the end of 443 s took the
+error 10 s ahead on the other half from 41 to 107 mm. No other value was tried."""
+
+
 class Parameter(NamedTuple):
     """One number of an effect, as the catalogue, model files and the command line have it.
 

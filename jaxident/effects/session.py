@@ -6,7 +6,7 @@ import numpy as np
 
 from jaxident.array_types import Array, Wheels
 from jaxident.effects import statements
-from jaxident.effects.effect import BOTH, UNIT, Coordinate, EffectRecord, Parameter, Search, Transform, signed
+from jaxident.effects.effect import BOTH, EDGE, UNIT, Coordinate, EffectRecord, Parameter, Search, Transform, signed
 from jaxident.effects.signals import Load, Zone
 
 
@@ -71,7 +71,7 @@ RECORDS = (
                       Transform(lambda c: {"ratio": 1.0 / (1.0 - c["loss"]), "instant": float(c["instant"])},
                                 lambda p: {"loss": 1.0 - 1.0 / p["ratio"], "instant": p["instant"]}),
                       lambda duration: [{"loss": 0.1, "instant": duration * part}
-                                        for part in np.linspace(0.2, 0.8, 12)]),
+                                        for part in np.linspace(EDGE, 1.0 - EDGE, 12)]),
     ),
 )  # fmt: skip
 """The effects of this site."""

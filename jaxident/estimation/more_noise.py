@@ -15,6 +15,7 @@ from jaxident.errors import InputError, WorkError
 from jaxident.log import Log
 
 DRAWS = 2
+"""Refits, each with noise of its own: they bound the cost. No other number was tried."""
 MOVED = 3.0
 """Standard deviations beyond which a move is no chance."""
 

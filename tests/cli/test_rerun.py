@@ -110,6 +110,8 @@ def test_inputs_that_moved_or_changed_are_told(made):
     assert "c.csv (--commands): no such file in" in ended.err
     assert "--data FOLDER" in ended.err
     assert rerun(made, "--data", "far/away/data").code == 0
+    shutil.move(made / "far" / "away" / "data" / "c.csv", made)
+    assert rerun(made, "--data", "far/away/data").code == 0, "one moved, the other is here"
     with open(made / "far" / "away" / "data" / "p.csv", "a") as stream:
         stream.write("99,0,0,0\n")
     ended = rerun(made, "--data", "far/away/data")

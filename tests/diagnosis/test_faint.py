@@ -10,7 +10,7 @@ from jaxident.diagnosis.causes.columns import tabulate
 from jaxident.diagnosis.causes.lost import find_lost, gain_beyond
 from jaxident.diagnosis.causes.moves import fit_options, stands
 from jaxident.diagnosis.causes.points import at_best, points_of
-from jaxident.diagnosis.causes.refit import EDGE, best_starts, bounds, refit
+from jaxident.diagnosis.causes.refit import best_starts, bounds, refit
 from jaxident.diagnosis.causes.rhythm import _travels, rhythms
 from jaxident.diagnosis.causes.search import best_set
 from jaxident.diagnosis.causes.steps import likely_steps
@@ -26,6 +26,7 @@ from jaxident.effects.coordinates import (
     from_catalogue,
     to_catalogue,
 )
+from jaxident.effects.effect import EDGE
 
 
 @pytest.fixture(scope="module")

@@ -53,9 +53,8 @@ class Option(NamedTuple):
 class Table(NamedTuple):
     """options; here: place of the option of each effect that the fit has. products (windows, n, n) and cross
     (windows, n): whitened products of columns among each other, and with the residual of a robot without effects;
-    whole (n, n) and right (n,): their sums over windows.
-    scale (n,): prior standard deviation of what a column is multiplied with, which is zero without the effect;
-    positive (n,): whether it is above zero."""
+    whole (n, n) and right (n,): their sums over windows. scale (n,): prior standard deviation of what a column is
+    multiplied with, which is zero without the effect; positive (n,): whether it is above zero."""
 
     options: list[Option]
     here: dict[str, int]

@@ -10,6 +10,7 @@ from jaxident.diagnosis.motion.linear import Linear, follow, gram, linearise, no
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.coordinates import NOMINAL, PLACES, REACHED, STEPPED, free_places, limits, neutral_vector
 from jaxident.effects.discovered import Laws
+from jaxident.effects.effect import EDGE
 
 MOST_STEPS = 20
 """Of one refit; what fits arrives in two to nine, what crawls is mostly an effect that is not there."""
@@ -17,10 +18,6 @@ ENOUGH = 0.05
 """Promised fall of -log p below which the search ends."""
 LONGEST = 0.5
 """A step changes a rate by at most this much, as a logarithm."""
-EDGE = 0.2
-"""Part of a session, at its begin and at its end, in which no change at an instant is looked for: few windows tell it,
-and it foretells all that follows. On half a log of a Create, a load that changed 19 s before the end of 443 s took the
-error 10 s ahead on the other half from 41 to 107 mm."""
 INSTANTS = [PLACES[pair] for pair, coordinate in REACHED.items() if not coordinate.relative]
 PARTS = (1.0, 0.25, 0.0)
 """Of the step of a window's start state that are tried."""

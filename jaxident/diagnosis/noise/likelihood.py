@@ -25,6 +25,7 @@ from jaxident.diagnosis.noise.law import (
 )
 
 MOST_STEPS = 12
+"""Of one search; seven of one case took 54 together."""
 SAMPLE, ROWS = 60, 20
 """Windows from which noise is sized, spread evenly, and rows of each that have a pose: slip is slow, and few rows show
 it."""

@@ -34,7 +34,10 @@ SLIDING = 10.0
 """Log-likelihood by which wheels that slide sideways at random may explain more than a memory of the camera: on twelve
 robots with such a memory they did by 3 or not at all, on six with low grip by 49 to 500."""
 FAINT = 0.01
-"""Part of all squares at which a search for a part begins at least: from nothing it would crawl."""
+"""Part of all squares at which a search for a part begins at least: from nothing it would crawl. No other value was
+tried; it moves where a search begins, not where it ends."""
+LITTLE = 0.1
+"""The same for slip and memory where the camera seems to explain all."""
 
 
 def size_noise(
@@ -71,7 +74,7 @@ def _white(given: Sample, camera: Law) -> tuple[Sized, Amounts]:
     white = likeliest(given, structure, Amounts(given.squares * structure.units))
     whole = white.amounts.camera
     own = np.minimum(amounts_of(camera, structure).camera, whole)
-    more = np.maximum(whole - own, 0.1 * whole)
+    more = np.maximum(whole - own, LITTLE * whole)
     return white, Amounts(np.maximum(own, FAINT * whole), more, more)
 
 
