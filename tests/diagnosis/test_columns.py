@@ -272,3 +272,15 @@ def test_a_free_column_that_answers_nothing_takes_nothing(plain):
     empty = np.zeros((*nominal.linear.residual.shape, 1))
     found = tabulate(data, nominal, (), empty, free=True)
     np.testing.assert_allclose(found.cross, table.cross, rtol=1e-6, atol=1e-6 * np.abs(table.cross).max())
+
+
+def test_what_a_term_and_an_effect_can_both_do_counts_for_an_owner(beside):
+    """A term that answers as the slope does, and a wave: free, it takes the slope's worth; beside an owner, nothing."""
+    data, fit, effects, term, alone = beside
+    own = linearise(fit.vector, fit.starts, data.windows, [PLACES["slope", "x"]]).slopes
+    term = own + term * np.std(own) / np.std(term) / 20.0
+    free, owned = (tabulate(data, fit, effects, term, free=True, owners=names) for names in ((), ("slope",)))
+    column = columns_of(alone, ("slope",))[0]
+    left = [np.diagonal(table.products.sum(axis=0))[column] for table in (free, owned, alone)]
+    assert left[0] < 0.1 * left[2]
+    assert left[1] == pytest.approx(left[2], rel=0.05)

@@ -4,14 +4,17 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support.small_robot import VECTOR, nominal_fit, robot_with, windows_of
+from support.small_robot import LAW, VECTOR, nominal_fit, robot_with, windows_of
 
 from jaxident.diagnosis.causes.columns import tabulate
+from jaxident.diagnosis.causes.corrector import Term
 from jaxident.diagnosis.causes.evidence import evidence_of, log_evidence
 from jaxident.diagnosis.causes.finding import finding_of
 from jaxident.diagnosis.causes.moves import ARRIVED, better, fit_options, look_alikes, stands
 from jaxident.diagnosis.causes.refit import refit
-from jaxident.diagnosis.causes.rounds import search, settle
+from jaxident.diagnosis.causes.rounds import Found, Settled, defended, search, settle
+from jaxident.diagnosis.causes.unexplained import Rest
+from jaxident.diagnosis.motion.linear import linearise
 from jaxident.diagnosis.noise.law import first_law
 from jaxident.effects.coordinates import NOMINAL, PLACES
 
@@ -186,3 +189,15 @@ def test_a_refit_that_is_far_behind_is_given_up(lagging):
     option = next(k for k, one in enumerate(table.options) if one.effect == "motor_lag")
     assert fit_options(data, table, now, [option], behind=-nominal.cost) is None
     assert fit_options(data, table, now, [option], behind=0.0) is not None
+
+
+@pytest.mark.parametrize(("gain", "kept"), [(5.0, True), (1e6, False)])
+def test_an_effect_leaves_for_a_term_that_does_the_same_only_if_terms_bring_much_beside_it(lagging, gain, kept):
+    """Beside the lag, a term that answers as the lag does brings less than a fifth of it, or far more."""
+    data, fit = fitted(lagging, ("motor_lag",), {LAG: 0.1})
+    now = stands(fit, ("motor_lag",))
+    answers = linearise(fit.vector, fit.starts, data.windows, [PLACES[LAG]]).slopes
+    rest = Rest([(Term("actuation", "as the lag does"), gain)], answers, LAW, 0.0)
+    settled = Settled(now, data, tabulate(data, fit, now.effects), {})
+    found = defended(Found(settled, LAW, LAW, rest, None))
+    assert ("motor_lag" in found.settled.now.effects) == kept

@@ -16,7 +16,7 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.causes.alike import with_prior
 from jaxident.diagnosis.causes.points import differences, points_of, seeded
 from jaxident.diagnosis.causes.refit import Data, Solution
-from jaxident.diagnosis.motion.linear import Linear, gram, linearise
+from jaxident.diagnosis.motion.linear import Linear, gram, linearise, normal
 from jaxident.effects.coordinates import (
     COORDINATES,
     NOMINAL,
@@ -36,6 +36,8 @@ less. No other value was tried."""
 FAR = 1e4
 """Answer in poses [m, rad] to one prior deviation from which on a robot runs away. Windows last seconds; beside the
 mass offset of one Create, other effects answered with 1e10 to 1e125."""
+SAME = 1e-6
+"""Part of a term's squares below which it is a copy of other columns."""
 NEUTRAL = neutral_vector(np.zeros(len(NOMINAL)))
 LOW, _ = limits()
 
@@ -83,10 +85,16 @@ class _Column(NamedTuple):
 
 
 def tabulate(
-    data: Data, fit: Solution, active: Collection[str], rest: Array | None = None, free: bool = False
+    data: Data,
+    fit: Solution,
+    active: Collection[str],
+    rest: Array | None = None,
+    free: bool = False,
+    owners: Collection[str] = (),
 ) -> Table:
     """The table about a fit that has some effects. rest (windows, numbers, terms): answers of the poses to what is in
-    no catalogue, taken away; or free like nominal parameters, so that it may stand in for effects."""
+    no catalogue, taken away; or free like nominal parameters, so that it may stand in for effects, but not for the
+    `owners` among them, to which counts what both can do."""
     options: list[Option] = []
     columns: list[_Column] = []
     for name in COORDINATES:
@@ -99,6 +107,8 @@ def tabulate(
     base = np.concatenate([linear.slopes[..., : len(NOMINAL)], more], axis=2)
     whole = np.concatenate([base, answers, linear.residual[..., None]], axis=2)
     products = gram(data.whitener, whole, linear.starts).products
+    owned = [base.shape[2] + column for name in owners for column in options[here[name]].columns]
+    products = _less_owned(products, range(len(NOMINAL), base.shape[2]), owned)
     cross = products[:, :-1, -1] + products[:, :-1, base.shape[2] : -1] @ [column.value for column in columns]
     scale = np.array([column.scale for column in columns])
     products, cross = _eliminated(fit, products[:, :-1, :-1], cross, base.shape[2] if free else len(NOMINAL))
@@ -106,6 +116,20 @@ def tabulate(
         products, cross = _without_rest(products, cross, scale)
     positive = np.array([column.positive for column in columns])
     return Table(options, here, products, cross, products.sum(axis=0), cross.sum(axis=0), scale, positive)
+
+
+def _less_owned(products: Array, terms: range, owned: list[int]) -> np.ndarray:
+    """Products (windows, n, n) with terms replaced by what nominal parameters and some columns leave of them."""
+    if not terms or not owned:
+        return products
+    known, whole = [*range(len(NOMINAL)), *owned], products.sum(axis=0)
+    turn = np.eye(len(whole))
+    for term in terms:
+        own, cross, length = normal(whole[np.ix_([*known, term], [*known, term])], list(range(len(known))))
+        turn[term, known] = -np.linalg.solve(own, cross) / length
+        if turn[term] @ whole @ turn[term] < SAME * whole[term, term]:
+            turn[term] = 0.0  # what rounding leaves of it would be that very effect again
+    return turn @ products @ turn.T
 
 
 def _ways(data: Data, fit: Solution, name: str, active: bool) -> list[tuple[Any, float, list[_Column]]]:
