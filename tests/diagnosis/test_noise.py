@@ -6,7 +6,15 @@ from support.arcs import along_arcs
 
 from jaxident.diagnosis.motion.responses import answer_to_start, respond
 from jaxident.diagnosis.noise.doubt import MEMORIES, doubt_of, draw_laws, sizes_by_memory
-from jaxident.diagnosis.noise.law import Law, covariance, first_law, slip_parts, white_whitener, whitener_of
+from jaxident.diagnosis.noise.law import (
+    Law,
+    covariance,
+    first_law,
+    inverse_of_lower,
+    slip_parts,
+    white_whitener,
+    whitener_of,
+)
 from jaxident.diagnosis.noise.likelihood import sample
 from jaxident.diagnosis.noise.sizing import size_noise, size_one, steady_gain
 
@@ -206,3 +214,9 @@ def test_fourth_differences_size_the_camera_where_poses_come_every_other_row(mad
     found = first_law(windows._replace(pose=np.where(seen[..., None], noisy, np.nan), seen=seen))
     assert found.position == pytest.approx(5e-4, rel=0.15)
     assert found.heading == pytest.approx(4e-3, rel=0.15)
+
+
+@pytest.mark.parametrize("rows", [1, 20, 57, 150])
+def test_lower_triangular_matrices_are_inverted_by_halves(rows):
+    lower = np.tril(np.random.default_rng(0).normal(size=(3, rows, rows))) / rows + 2.0 * np.eye(rows)
+    np.testing.assert_allclose(inverse_of_lower(lower), np.linalg.inv(lower), atol=1e-12)

@@ -11,6 +11,8 @@ from jaxident.diagnosis.motion.responses import Responses
 from jaxident.diagnosis.motion.windows import Windows
 
 EVERY = slice(None)
+SMALL = 12
+"""Rows below which a general inverse is as fast."""
 
 
 class Law(NamedTuple):
@@ -63,8 +65,20 @@ def covariance(law: Law, windows: Windows, responses: Responses, chosen: slice =
 
 def whitener_of(law: Law, windows: Windows, responses: Responses) -> np.ndarray:
     """The inverse Cholesky factor (windows, numbers, numbers) of the covariance; rows of unseen poses are zero."""
-    factor = np.linalg.inv(np.linalg.cholesky(covariance(law, windows, responses)))
+    factor = inverse_of_lower(np.linalg.cholesky(covariance(law, windows, responses)))
     return factor * numbers_seen(windows)[:, :, None]
+
+
+def inverse_of_lower(lower: Array) -> np.ndarray:
+    """Inverses of lower triangular matrices (..., n, n) by halves: a third of the time of a general inverse."""
+    half = lower.shape[-1] // 2
+    if half < SMALL:
+        return np.linalg.inv(lower)
+    first, last = inverse_of_lower(lower[..., :half, :half]), inverse_of_lower(lower[..., half:, half:])
+    found = np.zeros_like(lower)
+    found[..., :half, :half], found[..., half:, half:] = first, last
+    found[..., half:, :half] = -last @ (lower[..., half:, :half] @ first)
+    return found
 
 
 def white_whitener(law: Law, windows: Windows) -> np.ndarray:

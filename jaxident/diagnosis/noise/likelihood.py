@@ -17,6 +17,7 @@ from jaxident.diagnosis.noise.law import (
     Law,
     answers_of,
     camera_parts,
+    inverse_of_lower,
     memory_parts,
     numbers_of,
     of_unseen,
@@ -207,7 +208,17 @@ def _weigh(given: Sample, parts: Sequence[Array], amounts: Array) -> tuple[np.nd
     total = np.array(given.unseen)
     for amount, part in zip(amounts, parts, strict=True):
         total += amount * part
-    inverse = np.linalg.inv(total)
+    inverse, determinant = _inverse_of(total)
     taken = (inverse @ given.residual[..., None])[..., 0]
-    determinant = np.linalg.slogdet(total)[1]
     return -0.5 * (determinant + np.sum(given.residual * taken, axis=1)), inverse, taken
+
+
+def _inverse_of(total: Array) -> tuple[np.ndarray, np.ndarray]:
+    """Inverses (windows, m, m) of covariances and the logarithms of their determinants (windows,)."""
+    try:
+        lower = np.linalg.cholesky(total)
+    except np.linalg.LinAlgError:  # rounding has made one of them indefinite, or it is not finite
+        return np.linalg.inv(total), np.linalg.slogdet(total)[1]
+    factor = inverse_of_lower(lower)
+    diagonal = np.diagonal(lower, axis1=1, axis2=2)
+    return factor.transpose(0, 2, 1) @ factor, 2.0 * np.sum(np.log(diagonal), axis=1)
