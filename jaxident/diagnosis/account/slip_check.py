@@ -20,9 +20,9 @@ from jaxident.robot.noise import Noise
 SURE = 1.5
 """Standard errors of the mean square by which the law must foretell too much; chance alone does in one case of 15. At
 1.5 as at 3, the floor's interval lies above the error on 1 of 38 simulated robots."""
-MOST_STARTS = 200
+MOST_STARTS, FOR_PARAMETERS = 200, 50
 """Starts that are looked at, spread evenly: six runs of 1000 rows have fewer, a whole log of a Create three times as
-many, each predicted once for every parameter."""
+many. And starts that are predicted once for every parameter besides."""
 ROUNDS, NEAR = 6, 0.02
 """Steps in which slip is taken back, and the part of the error to which they go."""
 
@@ -32,27 +32,41 @@ def slip_seen(model: Model, prepared: Prepared, law: Law) -> float:
     clearly against it."""
     if law.slip is None or not len(prepared.naming.row):
         return 1.0
-    some = np.unique(np.linspace(0, len(prepared.naming.row) - 1, MOST_STARTS).round().astype(int))
-    starts = Starts(prepared.naming.run[some], prepared.naming.row[some])
-    fitted, unit = prepared._replace(log=prepared.fitted, judging=starts), deviations(law) ** 2
-    judged = judge_model(model, fitted)
+    bare, unit = dataclasses.replace(model, covariance=None, parameter_order=()), deviations(law) ** 2
+    fitted = prepared._replace(log=prepared.fitted, judging=_some(prepared.naming, MOST_STARTS))
+    judged = judge_model(bare, fitted)
     kept = np.isfinite(judged.error).all(axis=1)
     if not kept.any():
         return 1.0
     squares = np.mean(judged.error[kept] ** 2 / unit, axis=1)
     resampled = squares[blocks(np.random.default_rng(0), len(squares), RESAMPLES)].mean(axis=1)
-    # a fit to the same rows takes from their error what its parameters could move it by
-    taken = float(np.mean(np.sum(judged.slopes[:, kept] ** 2, axis=0) / unit))
-    seen, foretold = float(np.mean(squares)) + taken, _foretold(judged, kept, unit)
-    if foretold <= seen + SURE * float(np.std(resampled)):
+    seen, foretold, doubt = float(np.mean(squares)), _foretold(judged, kept, unit), SURE * float(np.std(resampled))
+    if foretold <= seen + doubt:
         return 1.0
-    factor, bare = 1.0, dataclasses.replace(model, covariance=None, parameter_order=())
+    seen += _taken_by_fit(model, fitted, unit)
+    if foretold <= seen + doubt:
+        return 1.0
+    factor = 1.0
     for _ in range(ROUNDS):
         factor *= max(seen - 1.0, NEAR) / max(foretold - 1.0, NEAR)
         foretold = _foretold(judge_model(with_slip(bare, factor), fitted), kept, unit)
         if abs(foretold / seen - 1.0) < NEAR:
             break
     return min(factor, 1.0)
+
+
+def _some(starts: Starts, most: int) -> Starts:
+    """So many of some starts, spread evenly."""
+    chosen = np.unique(np.linspace(0, len(starts.row) - 1, most).round().astype(int))
+    return Starts(starts.run[chosen], starts.row[chosen])
+
+
+def _taken_by_fit(model: Model, fitted: Prepared, unit) -> float:
+    """What a fit to the same rows takes from their mean error over the camera's variances: as much as its parameters
+    could move it by."""
+    slopes = judge_model(model, fitted._replace(judging=_some(fitted.judging, FOR_PARAMETERS))).slopes
+    found = np.sum(slopes**2, axis=0) / unit
+    return float(np.mean(found[np.isfinite(found).all(axis=1)])) if np.isfinite(found).all(axis=1).any() else 0.0
 
 
 def _foretold(judged, kept, unit) -> float:
