@@ -22,8 +22,9 @@ from jaxident.diagnosis.roles import split
 from jaxident.effects.coordinates import neutral_vector
 from jaxident.errors import InputError
 from jaxident.estimation.checks import check_informative
+from jaxident.estimation.observations import blind
 from jaxident.estimation.stretches import Starts
-from jaxident.log import Log, blind, join, run_begins
+from jaxident.log import Log, join, run_begins
 
 BURN = 20
 """Rows from which a window's start state is estimated before the horizon begins."""
