@@ -41,6 +41,8 @@ OFFSET_ADVICE = re.compile(r"jaxident convert --log LOG --pose-offset (\S+) --ou
 @click.option("--track", type=above_zero, metavar="W", help="Distance between the wheels [m], for commands in v,w.")
 @click.option("--pose-offset", type=OffsetOption(), default="0", show_default=True, help="Time added to the poses'; "
               "auto finds it, a delay of the robot included.")  # fmt: skip
+@click.option("--wheels-offset", type=OffsetOption(), default="0", show_default=True, help="Time added to the wheel "
+              "speeds'; auto finds the one at which they fit the poses.")  # fmt: skip
 @click.option("--hold-timeout", type=above_zero, metavar="S", help="A command older than this counts as zero.")
 @click.option("--out", metavar="LOG", help="The log to write (.csv or .csv.gz).")
 def command(**chosen):
@@ -135,7 +137,10 @@ def _from_log(chosen):
 
     log = read_whole(chosen["log"], chosen["columns"])
     offset, told = _offset(chosen, lambda: estimate_log_offset(log))
-    return shift_poses(log, offset, chosen["period"]), offset, told
+    if chosen["wheels_offset"] == 0.0:
+        return shift_poses(log, offset, chosen["period"]), offset, told
+    log, wheels_told = _moved_wheels(chosen, shift_poses(log, offset))
+    return log, offset, (*told, *wheels_told)
 
 
 def _from_streams(chosen):
@@ -146,8 +151,21 @@ def _from_streams(chosen):
     given, seen, notes = _from_bag(chosen) if chosen["bag"] else _from_files(chosen)
     offset, told = _offset(chosen, lambda: estimate_offset(given, seen, chosen["track"]))
     settings = {name: chosen[name] for name in ("period", "track", "hold_timeout")}
-    wheels = _wheels(chosen)
-    return merge(given, seen, wheels=wheels, pose_offset=offset, **settings), offset, (*notes, *told)
+    log = merge(given, seen, wheels=_wheels(chosen), pose_offset=offset, **settings)
+    log, wheels_told = _moved_wheels(chosen, log)
+    return log, offset, (*notes, *told, *wheels_told)
+
+
+def _moved_wheels(chosen, log):
+    """The log with the offset of its wheel speeds that was asked for, and a line that tells one that was found."""
+    from jaxident.files.offset import estimate_wheels_offset
+    from jaxident.files.shifted import shift_wheels
+
+    if chosen["wheels_offset"] != "auto":
+        return shift_wheels(log, chosen["wheels_offset"], chosen["period"]), ()
+    offset, error = estimate_wheels_offset(log)
+    line = f"--wheels-offset {offset:.6f} (standard error {error:.1g} s)"
+    return shift_wheels(log, offset, chosen["period"]), (line,)
 
 
 def _wheels(chosen):

@@ -21,6 +21,7 @@ from jaxident.diagnosis.translate import to_model
 from jaxident.diagnosis.verdict import Judgement, judge
 from jaxident.effects.coordinates import ASIDE, PLACES
 from jaxident.errors import InputError
+from jaxident.estimation.observations import poses_only
 from jaxident.estimation.suspicions import log_suspicions
 from jaxident.log import Log, join
 from jaxident.numerics import require_float64
@@ -39,6 +40,11 @@ class Parameter(NamedTuple):
     nominal: float | None
     refitted: float
     standard_deviation: float
+
+
+UNUSED_WHEELS = (
+    "wheel speeds are not used: a diagnosis judges by the poses alone so far; `jaxident identify` uses both sensors"
+)
 
 
 class Diagnosis(NamedTuple):
@@ -90,6 +96,8 @@ def diagnose(
     its shrink alone. seed: of the laws of noise drawn and the shuffles behind intervals; nothing else is drawn. Needs
     double precision and a minute. InputError for logs that say nothing, and for a simulator in other units."""
     require_float64("diagnose")
+    unused = unused_wheels(logs)
+    logs = poses_only(join(logs)) if unused else logs
     check_nominal(logs, sim, model)
     simulator = None if model is None else as_simulator(model, logs)
     prepared, finding = find_effects(prepare(logs, horizon, None if simulator is None else simulator.vector[:10]))
@@ -112,7 +120,12 @@ def diagnose(
     nominal = to_model(prepared, finding.nominal.vector, finding.law, (), None, finding.nominal)
     return Diagnosis(verdict, judgement, gap, account, where, selected, parameters, visible(known),
                      replay(known, seed), advice(verdict, judgement, laws), nominal, corrected, shrinks, prepared,
-                     finding, surplus, simulator, laws, log_suspicions(join(logs)))  # fmt: skip
+                     finding, surplus, simulator, laws, (*log_suspicions(join(logs)), *unused))  # fmt: skip
+
+
+def unused_wheels(logs: Log | Sequence[Log]) -> tuple[str, ...]:
+    """A line for logs with wheel speeds, which a diagnosis does not use yet."""
+    return () if join(logs).wheel_r is None else (UNUSED_WHEELS,)
 
 
 def check_nominal(logs: Log | Sequence[Log], sim: Log | Sequence[Log] | None, model: Model | None) -> None:

@@ -29,7 +29,7 @@ from jaxident.estimation.parameters import Law, Robot, from_vector, names, to_ve
 from jaxident.estimation.precision import law_of, natural_values
 from jaxident.estimation.prior import Prior
 from jaxident.estimation.replicate import replicate_run
-from jaxident.estimation.runs import Runs, run_axes, stack_runs
+from jaxident.estimation.runs import Runs, run_axes, stack_runs, with_wheels
 from jaxident.estimation.scoring import Point, search_from
 from jaxident.log import Log, join
 from jaxident.numerics import require_float64, safe_divide
@@ -87,7 +87,11 @@ def bootstrap(
     log = join(logs)
     largest = float(np.nanmax(np.abs(np.stack(log.command))))
     runs = stack_runs(log)
-    law = law_of(found.fit.robot.drive, found.fit.robot.noise)
+    wheels = found.fit.robot.wheels is not None
+    if wheels and resample != "runs":
+        raise InputError("bootstrap: blocks of residuals are drawn of poses alone; with wheel speeds draw whole 'runs'")
+    runs = with_wheels(runs, log) if wheels else runs
+    law = law_of(found.fit.robot.drive, found.fit.robot.noise, wheels)
     fitted = found.fit.robot, found.fit.starts, found.fit.innovations.normalised
     _check(resample, runs, block)
     if resample == "blocks":

@@ -4,6 +4,7 @@ import numpy as np
 
 from jaxident.errors import InputError
 from jaxident.estimation.suspicions import misread_heading
+from jaxident.estimation.wheel_suspicions import wheels_turn
 from jaxident.log import Log
 from jaxident.rules import check_pose_rate
 
@@ -30,7 +31,11 @@ def check_informative(log: Log) -> None:
             "by 1.8 rad: they are noise, or of a robot that turns faster than the camera sees"
         )
     if not moves(log, seen):
-        raise InputError("nothing moves: the poses are at rest within the camera's noise while the commands change")
+        air = "; its wheels turn: are they in the air? A log on the ground shows how the robot moves"
+        raise InputError(
+            "nothing moves: the poses are at rest within the camera's noise while the commands change"
+            + (air if wheels_turn(log) else "")
+        )
 
 
 def _turn(log: Log, seen: np.ndarray) -> float:

@@ -79,3 +79,8 @@ def blind(log: Log, rows: Any) -> Log:
     """The log without the poses of some rows, boolean (samples,)."""
     x, y, theta = (np.where(rows, np.nan, column) for column in log.pose)
     return log._replace(x=x, y=y, theta=theta)
+
+
+def poses_only(log: Log) -> Log:
+    """The log without wheel speeds."""
+    return log if log.wheel_r is None else log._replace(wheel_r=None, wheel_l=None)
