@@ -21,7 +21,6 @@ from jaxident.diagnosis.translate import to_model
 from jaxident.diagnosis.verdict import Judgement, judge
 from jaxident.effects.coordinates import ASIDE, PLACES
 from jaxident.errors import InputError
-from jaxident.estimation.observations import poses_only
 from jaxident.estimation.suspicions import log_suspicions
 from jaxident.log import Log, join
 from jaxident.numerics import require_float64
@@ -96,8 +95,6 @@ def diagnose(
     its shrink alone. seed: of the laws of noise drawn and the shuffles behind intervals; nothing else is drawn. Needs
     double precision and a minute. InputError for logs that say nothing, and for a simulator in other units."""
     require_float64("diagnose")
-    unused = unused_wheels(logs)
-    logs = poses_only(join(logs)) if unused else logs
     check_nominal(logs, sim, model)
     simulator = None if model is None else as_simulator(model, logs)
     prepared, finding = find_effects(prepare(logs, horizon, None if simulator is None else simulator.vector[:10]))
@@ -120,7 +117,8 @@ def diagnose(
     nominal = to_model(prepared, finding.nominal.vector, finding.law, (), None, finding.nominal)
     return Diagnosis(verdict, judgement, gap, account, where, selected, parameters, visible(known),
                      replay(known, seed), advice(verdict, judgement, laws), nominal, corrected, shrinks, prepared,
-                     finding, surplus, simulator, laws, (*log_suspicions(join(logs)), *unused))  # fmt: skip
+                     finding, surplus, simulator, laws,
+                     (*log_suspicions(join(logs)), *unused_wheels(logs)))  # fmt: skip
 
 
 def unused_wheels(logs: Log | Sequence[Log]) -> tuple[str, ...]:

@@ -86,12 +86,8 @@ def bootstrap(
         raise InputError(f"bootstrap: {count} replicates; a standard deviation needs at least {SMALLEST_COUNT}")
     log = join(logs)
     largest = float(np.nanmax(np.abs(np.stack(log.command))))
-    runs = stack_runs(log)
-    wheels = found.fit.robot.wheels is not None
-    if wheels and resample != "runs":
-        raise InputError("bootstrap: blocks of residuals are drawn of poses alone; with wheel speeds draw whole 'runs'")
-    runs = with_wheels(runs, log) if wheels else runs
-    law = law_of(found.fit.robot.drive, found.fit.robot.noise, wheels)
+    runs = _runs_of(log, found.fit.robot, resample)
+    law = law_of(found.fit.robot.drive, found.fit.robot.noise, runs.wheels is not None)
     fitted = found.fit.robot, found.fit.starts, found.fit.innovations.normalised
     _check(resample, runs, block)
     if resample == "blocks":
@@ -106,6 +102,15 @@ def bootstrap(
     values, ok, _ = refit(keys, robot, begins, innovation, runs, limit, law, block, prior)
     estimate = np.asarray(natural_values(robot, law))
     return summarise(estimate, np.asarray(values), np.asarray(ok), names(law), resample, block)
+
+
+def _runs_of(log: Log, robot: Robot, resample: str) -> Runs:
+    """The runs of a log with the sensors that a fit has used."""
+    if robot.wheels is None:
+        return stack_runs(log)
+    if resample == "blocks":
+        raise InputError("bootstrap: blocks of residuals are drawn of poses alone; with wheel speeds draw whole 'runs'")
+    return with_wheels(stack_runs(log), log)
 
 
 def _check(resample: str, runs: Runs, block: int | None) -> None:
