@@ -115,10 +115,9 @@ def diagnose(
     parameters = compare_parameters(prepared, finding, told, common)
     verdict = decide(prepared, judgement, selected, parameters)
     nominal = to_model(prepared, finding.nominal.vector, finding.law, (), None, finding.nominal)
-    return Diagnosis(verdict, judgement, gap, account, where, selected, parameters, visible(known),
-                     replay(known, seed), advice(verdict, judgement, laws), nominal, corrected, shrinks, prepared,
-                     finding, surplus, simulator, laws,
-                     (*log_suspicions(join(logs)), *unused_wheels(logs)))  # fmt: skip
+    return Diagnosis(verdict, judgement, gap, account, where, selected, parameters, visible(known), replay(known, seed),
+                     advice(verdict, judgement, laws), nominal, corrected, shrinks, prepared, finding, surplus,
+                     simulator, laws, (*log_suspicions(join(logs)), *unused_wheels(logs)))  # fmt: skip
 
 
 def unused_wheels(logs: Log | Sequence[Log]) -> tuple[str, ...]:

@@ -77,9 +77,7 @@ def identify(
     """
     require_float64("identify")
     _check_method(method, coupling, {"setup time": setup_time, "forgetting": forgetting, "reading": reading})
-    log = join(logs)
-    check_informative(log)
-    log, doubts = _chosen_sensors(log, method)
+    log, doubts = _chosen_sensors(join(logs), method)
     largest = float(np.nanmax(np.abs(np.stack(log.command))))
     d_max = D_MAX_SHARE * largest if d_max is None else d_max
     check_settings(1.0 if forgetting is None else forgetting, d_max, largest)
@@ -101,7 +99,9 @@ def _identify_by_likelihood(log: Log, d_max: float, noise_law: str, coupling: bo
 
 
 def _chosen_sensors(log: Log, method: str) -> tuple[Log, tuple[str, ...]]:
-    """The log without wheel speeds that the method or the camera has no use for, and what is to be said of them."""
+    """The log without wheel speeds that the method or the camera has no use for, and what is to be said of them;
+    InputError for a log that shows nothing."""
+    check_informative(log)
     if log.wheel_r is None or not np.isfinite([log.wheel_r, log.wheel_l]).any():
         return poses_only(log), ()
     if method != "maximum-likelihood":
