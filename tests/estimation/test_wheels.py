@@ -130,20 +130,18 @@ LOGS = ("rate_1", "rate_2", "position", "heading", "slip_along", "slip_heading",
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("slip", [False, True])
-def test_errors_reach_the_bound_of_both_sensors_and_intervals_cover(slip):
-    """400 robots of 15 s. The ratio of root mean square to bound has a standard error of 3.5 % a number, of about 1.5 %
-    over the ten of robot and wheels, which hang together; their coverage one of 0.5 %."""
-    error, covered, ok = trials(400, 300, slip)
+@pytest.mark.parametrize(("slip", "count"), [(False, 1000), (True, 400)])
+def test_errors_reach_the_bound_of_both_sensors_and_intervals_cover(slip, count):
+    """Robots of 15 s. The ratio of root mean square to bound has a standard error of 2.2 % (1000 robots) or 3.5 %,
+    of about 1.5 % over the ten numbers of robot and wheels, which hang together; their coverage one of 0.5 %."""
+    error, covered, ok = trials(count, 300, slip)
     assert ok.mean() > 0.995
-    error, covered = error[ok], covered[ok]
-    ratio = np.sqrt(np.mean(error**2, axis=0))
+    ratio = np.sqrt(np.mean(error[ok] ** 2, axis=0))
     order = names(Law(slip=slip, wheels=True))
     robot = [k for k, name in enumerate(order) if k < 8 or name in ("wheel_radius", "wheel_track")]
-    print(dict(zip(order, ratio.round(3), strict=True)), covered.mean(axis=0).round(3))
     assert np.sqrt(np.mean(ratio[robot] ** 2)) < 1.05
     assert ratio[robot].max() < 1.15
-    assert 0.925 < covered[:, robot].mean() < 0.975
+    assert 0.93 < covered[ok][:, robot].mean() < 0.97
 
 
 def test_a_sensor_without_error_reports_the_rim():
