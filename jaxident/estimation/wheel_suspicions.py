@@ -11,6 +11,7 @@ import numpy as np
 from jaxident.array_types import Pose, Wheels
 from jaxident.estimation.clock_offset import PAUSE, Response, Streams, respond, streams_of
 from jaxident.estimation.residual_tests import whiteness
+from jaxident.estimation.wheel_answer import late_wheels, typical_step
 from jaxident.log import Log
 
 MOST = 20_000
@@ -54,8 +55,9 @@ def check_wheels(log: Log) -> WheelCheck:
     wrong = "" if response is None else wheel_signs(response)
     if wrong:
         return WheelCheck(False, (*filter(None, lines), f"{wrong}; they are not used"))
-    if response is not None:
-        lines += [unit(response), offset(response, log)]
+    clock = "" if response is None else offset(response, log)
+    lines += ["" if response is None else unit(response), clock]
+    lines += () if clock else late_wheels(log)  # late stamps of the wheels would look like late wheels
     return WheelCheck(True, tuple(filter(None, lines)))
 
 
@@ -179,7 +181,7 @@ def offset(response: Response, log: Log) -> str:
     """Wheel speeds that come early or late beside the poses, by about a row or more."""
     lag = float(np.mean(1.0 / response.rate))  # what a lag takes up of the offset, to first order
     late, error = response.offset - lag, response.standard_error
-    step = float(np.median(np.concatenate([np.diff(run.t) for run in log.runs() if len(run.t) > 1])))
+    step = typical_step(log)
     if response.rival is not None or not abs(late) > max(SEVERAL * step, SURE * error):
         return ""
     word = "late" if late > 0.0 else "early"

@@ -10,6 +10,7 @@ import pytest
 import jaxident as ji
 from jaxident.columns import parse_columns
 from jaxident.errors import InputError
+from jaxident.estimation.wheel_answer import answer_of_wheels
 from jaxident.estimation.wheel_suspicions import check_wheels, wheel_offset
 from jaxident.files.shifted import shift_wheels
 from jaxident.robot.drive import Physical
@@ -97,10 +98,25 @@ def test_another_clock_is_told_with_its_error_and_mended(log, late):
     assert check_wheels(shift_wheels(wrong, offset)) == (True, ())
 
 
+def test_a_delay_before_the_wheel_is_measured_with_the_lag_behind_it(log):
+    """Commands two rows earlier are a delay of 0.1 s; the rates of this robot are 3 and 5 per second."""
+    found = answer_of_wheels(log)
+    assert abs(found.delay) < max(5.0 * found.standard_error, 0.01)
+    np.testing.assert_allclose(found.lag, [1 / 3, 1 / 5], rtol=0.1)
+    early = log._replace(u_r=np.append(log.u_r[2:], [0.0, 0.0]), u_l=np.append(log.u_l[2:], [0.0, 0.0]))
+    found = answer_of_wheels(early)
+    assert abs(found.delay - 0.1) < max(5.0 * found.standard_error, 0.01)
+    usable, lines = check_wheels(early)
+    assert usable
+    assert any("not the ground" in line for line in lines)
+    random = np.random.default_rng(0)
+    assert answer_of_wheels(with_speeds(log, lambda r, s: (random.normal(size=500), random.normal(size=500)))) is None
+
+
 def test_wheels_in_the_air_are_named(log):
     random = np.random.default_rng(0)
     air = log._replace(**{name: 1e-3 * random.normal(size=500) for name in ("x", "y", "theta")})
-    with pytest.raises(InputError, match=r"nothing moves.*its wheels turn: are they in the air"):
+    with pytest.raises(InputError, match=r"nothing moves.*its wheels turn: are they in the air.*answer the commands"):
         ji.identify(air)
 
 
