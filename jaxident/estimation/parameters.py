@@ -26,7 +26,7 @@ class Robot(NamedTuple):
     drive: Physical
     dead_zone: Any
     noise: Noise
-    wheels: WheelSensor | None = None
+    wheels: Any = None
 
 
 NAMES = (

@@ -17,16 +17,16 @@ class Runs(NamedTuple):
     """Commands and poses of runs, arrays (runs, rows), finite everywhere; a single run where the axis is dropped.
 
     step [s]: from each row to the next, or one number where all are equal. seen: whether a pose was measured there;
-    rows past the end of a shorter run have none. wheels [rad/s], turning: wheel speeds, and whether each was measured;
-    None for logs without.
+    rows past the end of a shorter run have none. wheels [rad/s], turning: wheel speeds and whether each was measured,
+    both `Wheels`; None for logs without.
     """
 
     step: Any
     command: Wheels
     pose: Pose
     seen: Any
-    wheels: Wheels | None = None
-    turning: Wheels | None = None
+    wheels: Any = None
+    turning: Any = None
 
 
 def stack_runs(log: Log) -> Runs:
