@@ -9,6 +9,7 @@ import pytest
 
 import jaxident as ji
 from jaxident.array_types import Wheels
+from jaxident.diagnosis.diagnose import unused_wheels
 from jaxident.errors import InputError
 from jaxident.estimation.maximum_likelihood import fit_runs
 from jaxident.estimation.parameters import Law, names
@@ -64,6 +65,8 @@ def test_both_sensors_find_the_robot_and_its_wheels(tmp_path):
     again = ji.load_model(tmp_path / "m.json")
     assert again.wheels == found.model.wheels
     np.testing.assert_allclose(again.standard_deviation.wheels, found.model.standard_deviation.wheels)
+    with pytest.raises(InputError, match="with wheel speeds draw whole 'runs'"):
+        ji.bootstrap(jax.random.key(0), found, recorded(2))
     bound = ji.cramer_rao(ROBOT, recorded(2), NOISE)
     alone = ji.cramer_rao(ROBOT, recorded(2)._replace(wheel_r=None, wheel_l=None), NOISE)
     assert bound.order[-3:] == ("wheel_radius", "wheel_track", "wheel_noise")
@@ -142,6 +145,12 @@ def test_errors_reach_the_bound_of_both_sensors_and_intervals_cover(slip, count)
     assert np.sqrt(np.mean(ratio[robot] ** 2)) < 1.05
     assert ratio[robot].max() < 1.15
     assert 0.93 < covered[ok][:, robot].mean() < 0.97
+
+
+def test_a_diagnosis_says_that_it_does_not_use_them():
+    log = excite(jax.random.key(0), "multilevel", 20, 0.05)
+    assert unused_wheels(log) == ()
+    assert "not used" in unused_wheels([log, log._replace(wheel_r=log.t, wheel_l=log.t)])[0]
 
 
 def test_a_sensor_without_error_reports_the_rim():
