@@ -19,10 +19,12 @@ _SPEED = {f"{name}/s": factor for name, factor in _LENGTH.items()} | {"km/h": (1
 _TURNING = {f"{name}/s": factor for name, factor in _ANGLE.items()} | {"rpm": (np.pi, 30.0)}
 UNITS: dict[str, dict[str, tuple[float, float]]] = {
     "t": _TIME, "x": _LENGTH, "y": _LENGTH, "theta": _ANGLE, "v": _SPEED, "w": _TURNING,
+    "wheel_r": _TURNING, "wheel_l": _TURNING,
 }  # fmt: skip
 """Per column the units it may have: value * first / second is in SI. Commands have the unit of the user's choice."""
 QUATERNION = ("qx", "qy", "qz", "qw")
-NAMES = ("t", "u_r", "u_l", "v", "w", "x", "y", "theta", *QUATERNION, "run")
+WHEELS = ("wheel_r", "wheel_l")
+NAMES = ("t", "u_r", "u_l", "v", "w", "x", "y", "theta", *QUATERNION, "run", *WHEELS)
 _NUMBER = r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _UNIT = re.compile(rf"(?P<factor>[+-]?{_NUMBER})?(?P<name>[A-Za-z][A-Za-z/]*)?(?P<offset>[+-]{_NUMBER})?")
 _ISO = re.compile(r"(\d{4}-\d\d-\d\d[T ]\d\d:\d\d(?::\d\d(?:\.\d{1,9})?)?)(?:(Z)|([+-])(\d\d):?(\d\d))?")
@@ -125,6 +127,36 @@ def heading_of(qx: Any, qy: Any, qz: Any, qw: Any) -> np.ndarray:
     x, y, z, w = (np.asarray(part, float) for part in (qx, qy, qz, qw))
     theta = np.arctan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
     return np.where(x * x + y * y + z * z + w * w > 0.0, theta, np.nan)
+
+
+def columns_of_frame(frame: Any, columns: Any = None, units: Any = None) -> dict[str, np.ndarray]:
+    """The columns of a log that a data frame, or a dict of arrays, has; as `Log.from_dataframe` says."""
+    named = {str(column): column for column in frame.keys()}  # noqa: SIM118 - a frame's, too
+    chosen, change = split_heading(named, make_columns(columns, units))
+    header = rename(named, chosen, "frame")
+    found = {name: frame[named[source]] for name, source in zip(header, named, strict=True)}
+    values = {name: numbers(name, found[name]) for name in NAMES if name in found and name not in ("v", "w")}
+    values |= {name: column.convert(values[name]) for name, column in chosen.items() if name in values}
+    if "theta" not in values and all(name in values for name in QUATERNION):
+        values["theta"] = heading_of(*(values[name] for name in QUATERNION))
+        values["theta"] = change.convert(values["theta"]) if change else values["theta"]
+    missing = [name for name in ("t", "u_r", "u_l") if name not in values]
+    if missing:
+        raise InputError(
+            f"frame: no column {missing[0]}; there are {', '.join(named)}; name it: columns={{{missing[0]!r}: ...}}"
+        )
+    check_both_wheels("frame", values)
+    return {name: column for name, column in values.items() if name not in QUATERNION}
+
+
+def check_both_wheels(name: str, columns: Iterable[str]) -> None:
+    """InputError for columns, of the table or log `name`, that have the speed of one wheel alone."""
+    found = [column for column in WHEELS if column in columns]
+    if len(found) == 1:
+        other = WHEELS[1 - WHEELS.index(found[0])]
+        raise InputError(
+            f"{name}: has the column {found[0]} and no column {other}; a log has the speeds of both wheels, or of none"
+        )
 
 
 def seconds(nanoseconds: Any) -> np.ndarray:

@@ -1,34 +1,25 @@
 """A log: the columns of a file, and what can be said of its time base.
 
-Row k holds the time t_k, the command applied from t_k until t_{k+1} and the camera pose at t_k.
+Row k holds the time t_k, the command applied from t_k until t_{k+1}, the camera pose and perhaps wheel speeds at t_k.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from jaxident.array_types import Pose, Wheels
-from jaxident.columns import QUATERNION, heading_of, make_columns, numbers, rename, split_heading
+from jaxident.columns import WHEELS, check_both_wheels, columns_of_frame, numbers
 from jaxident.errors import InputError
-from jaxident.rules import Rule, enforce, pose_rules, rising_time
+from jaxident.rules import enforce, log_rules, repeat_last
 
 EVEN_TOLERANCE = 0.05
 """Largest departure of a time step from the period, in periods: stamps rounded to a millisecond pass up to 60 Hz,
 jitter and gaps do not."""
-LARGEST_RUN = 2**53
-"""Beyond this double precision no longer tells one integer from the next."""
 
 
-class Log(NamedTuple):
-    """Motor commands and camera poses, one entry per row, all arrays (samples,).
-
-    t [s] rises strictly within a run; u_r, u_l in the user's unit; x, y [m], theta [rad], NaN where the camera saw
-    nothing; run numbers the runs. A named tuple of arrays: it passes through `jit` and `vmap` as it is, and unpacks
-    into its columns. A slice, a mask or an array of rows picks rows: `log[:10]` is a log of ten.
-    """
-
+class _Columns(NamedTuple):
     t: Any
     u_r: Any
     u_l: Any
@@ -37,13 +28,36 @@ class Log(NamedTuple):
     theta: Any
     run: Any
 
+
+class Log(_Columns):
+    """Motor commands and camera poses, one entry per row, all arrays (samples,).
+
+    t [s] rises strictly within a run; u_r, u_l in the user's unit; x, y [m], theta [rad], NaN where the camera saw
+    nothing; run numbers the runs. A named tuple of arrays: it passes through `jit` and `vmap` as it is, and unpacks
+    into its columns. A slice, a mask or an array of rows picks rows: `log[:10]` is a log of ten.
+
+    wheel_r, wheel_l: the robot's own wheel speeds [rad/s], NaN where it measured none. In a log without them both are
+    None, and no columns of the tuple; a log with them is a `LogWithWheels`.
+    """
+
+    __slots__ = ()
+
+    def __new__(cls, t, u_r, u_l, x, y, theta, run, wheel_r=None, wheel_l=None) -> "Log":
+        """A log of seven columns, or of nine with both wheels' speeds. InputError for one wheel alone."""
+        columns = t, u_r, u_l, x, y, theta, run
+        if wheel_r is None and wheel_l is None:
+            return tuple.__new__(Log, columns)
+        given = zip(WHEELS, (wheel_r, wheel_l), strict=True)
+        check_both_wheels("log", [name for name, column in given if column is not None])
+        return tuple.__new__(LogWithWheels, (*columns, wheel_r, wheel_l))
+
     @classmethod
-    def from_arrays(cls, t, u_r, u_l, x=None, y=None, theta=None, run=None) -> "Log":
+    def from_arrays(cls, t, u_r, u_l, x=None, y=None, theta=None, run=None, wheel_r=None, wheel_l=None) -> "Log":
         """A checked log, float64, from arrays (samples,); what is left out as in `make_log`.
 
         The rules are those of a log file: InputError names the row that breaks one.
         """
-        return from_columns(make_log(t, u_r, u_l, x, y, theta, run)._asdict())
+        return from_columns(make_log(t, u_r, u_l, x, y, theta, run, wheel_r, wheel_l)._asdict())
 
     @classmethod
     def from_dataframe(
@@ -71,6 +85,20 @@ class Log(NamedTuple):
         """The command columns."""
         return Wheels(self.u_r, self.u_l)
 
+    @property
+    def wheel_r(self) -> Any:
+        """Measured speed of the right wheel [rad/s]; None in a log without wheel speeds."""
+        return None
+
+    @property
+    def wheel_l(self) -> Any:
+        """As `wheel_r`, of the left wheel."""
+        return None
+
+    def _replace(self, **changes: Any) -> "Log":
+        """The log with some columns changed; wheel speeds join it, or as None leave it."""
+        return Log(**(self._asdict() | changes))
+
     def runs(self) -> list["Log"]:
         """The log cut into its runs, in the order in which they first appear."""
         run = np.asarray(self.run)
@@ -91,7 +119,9 @@ class Log(NamedTuple):
             return f"Log({', '.join(f'{name}={np.shape(column)}' for name, column in self._asdict().items())})"
         runs, seen = self.runs(), np.isfinite(np.asarray(self.x, float)).mean()
         seconds = sum(float(run.t[-1] - run.t[0]) for run in runs)
-        return f"Log of {len(self.t)} rows in {len(runs)} run(s), {seconds:.4g} s, {100.0 * seen:.3g} % with a pose"
+        told = f"Log of {len(self.t)} rows in {len(runs)} run(s), {seconds:.4g} s, {100.0 * seen:.3g} % with a pose"
+        measured = wheels_measured(self)
+        return told if measured is None else f"{told}, {100.0 * measured.mean():.3g} % with both wheel speeds"
 
     def to_dataframe(self) -> Any:
         """The columns as a pandas data frame."""
@@ -106,11 +136,31 @@ class Log(NamedTuple):
         return tuple.__getitem__(self, rows)
 
 
-def make_log(t, u_r, u_l, x=None, y=None, theta=None, run=None) -> Log:
-    """A log from arrays (samples,); columns left out are a camera that saw nothing, and a single run."""
+class LogWithWheels(Log):
+    """A log that has wheel speeds: nine columns."""
+
+    __slots__ = ()
+    _fields = (*_Columns._fields, *WHEELS)  # type: ignore[assignment]
+
+    def __new__(cls, *columns: Any) -> "LogWithWheels":
+        """All nine columns; made by `Log`."""
+        return tuple.__new__(cls, columns)
+
+    wheel_r = property(lambda self: tuple.__getitem__(self, 7), doc="Measured speed of the right wheel [rad/s].")
+    wheel_l = property(lambda self: tuple.__getitem__(self, 8), doc="Measured speed of the left wheel [rad/s].")
+
+
+def wheels_measured(log: Log) -> np.ndarray | None:
+    """Boolean (samples,): rows with both wheel speeds; None in a log without the columns."""
+    return None if log.wheel_r is None else np.isfinite(log.wheel_r) & np.isfinite(log.wheel_l)
+
+
+def make_log(t, u_r, u_l, x=None, y=None, theta=None, run=None, wheel_r=None, wheel_l=None) -> Log:
+    """A log from arrays (samples,); columns left out are a camera that saw nothing, a single run, no wheel speeds."""
     blind = np.full(np.shape(t), np.nan)
     x, y, theta = (blind if column is None else column for column in (x, y, theta))
-    return Log(t, u_r, u_l, x, y, theta, np.zeros(np.shape(t), int) if run is None else run)
+    run = np.zeros(np.shape(t), int) if run is None else run
+    return Log(t, u_r, u_l, x, y, theta, run, wheel_r, wheel_l)
 
 
 def from_columns(columns: Mapping[str, Any], name: str = "log") -> Log:
@@ -124,21 +174,7 @@ def from_columns(columns: Mapping[str, Any], name: str = "log") -> Log:
 
 def from_frame(frame: Any, columns: Any = None, units: Any = None) -> Log:
     """What `Log.from_dataframe` says."""
-    named = {str(column): column for column in frame.keys()}  # noqa: SIM118 - a frame's, too
-    chosen, change = split_heading(named, make_columns(columns, units))
-    header = rename(named, chosen, "frame")
-    found = {name: frame[named[source]] for name, source in zip(header, named, strict=True)}
-    values = {name: numbers(name, found[name]) for name in (*Log._fields, *QUATERNION) if name in found}
-    values |= {name: column.convert(values[name]) for name, column in chosen.items() if name in values}
-    if "theta" not in values and all(name in values for name in QUATERNION):
-        values["theta"] = heading_of(*(values[name] for name in QUATERNION))
-        values["theta"] = change.convert(values["theta"]) if change else values["theta"]
-    missing = [name for name in ("t", "u_r", "u_l") if name not in values]
-    if missing:
-        raise InputError(
-            f"frame: no column {missing[0]}; there are {', '.join(named)}; name it: columns={{{missing[0]!r}: ...}}"
-        )
-    return from_columns(make_log(**{name: values[name] for name in Log._fields if name in values})._asdict(), "frame")
+    return from_columns(make_log(**columns_of_frame(frame, columns, units))._asdict(), "frame")
 
 
 def require_log(log: Any, caller: str) -> None:
@@ -151,32 +187,11 @@ def checked(log: Log, name: str, place: Callable[[int], str]) -> Log:
     """The log (float64 arrays) if it keeps the rules of a log, run int64, last commands filled as `read_log` says."""
     if len(log.t) == 0:
         raise InputError(f"{name}: has no rows; a log needs two at least")
-    enforce(_rules(log), log._asdict(), place)
+    enforce(log_rules(log, first_rows(log)), log._asdict(), place)
     if first_rows(log).all():
         raise InputError(f"{name}: no run has two rows; a log needs one that has")
-    u_r, u_l = (_repeat_last(command, log.run) for command in log.command)
+    u_r, u_l = (repeat_last(command, log.run) for command in log.command)
     return log._replace(u_r=u_r, u_l=u_l, run=log.run.astype(np.int64))
-
-
-def _repeat_last(command: np.ndarray, run: np.ndarray) -> np.ndarray:
-    """Every missing command replaced by the one of the row before, 0 where that row is of another run."""
-    before = np.concatenate([[0.0], np.where(run[1:] == run[:-1], command[:-1], 0.0)])
-    return np.where(np.isnan(command), before, command)
-
-
-def _rules(log: Log) -> Iterator[Rule]:
-    yield Rule("run", ~(log.run == np.round(log.run)) | (np.abs(log.run) >= LARGEST_RUN), "it should be an integer")
-    first = first_rows(log)
-    starts = np.flatnonzero(first)
-    _, new = np.unique(log.run[starts], return_index=True)
-    again = np.zeros(len(first), bool)
-    again[np.delete(starts, new)] = True
-    yield Rule("run", again, "the rows of a run must stand together")
-    yield from rising_time(log.t, first)
-    last = np.append(first[1:], True)
-    for name, command in zip(("u_r", "u_l"), log.command, strict=True):
-        yield Rule(name, ~np.isfinite(command) & ~last, "only a run's last row may have no command")
-    yield from pose_rules(log.pose)
 
 
 def join(logs: "Log | Sequence[Log]") -> Log:
@@ -184,7 +199,15 @@ def join(logs: "Log | Sequence[Log]") -> Log:
     logs = [logs] if isinstance(logs, Log) else list(logs)
     runs = [run for log in logs for run in log.runs()]
     numbered = [run._replace(run=np.full(len(run.t), number)) for number, run in enumerate(runs)]
+    if any(log.wheel_r is not None for log in logs):  # where a log has none, none were measured
+        numbered = [_with_wheels(run) for run in numbered]
     return Log(*(np.concatenate(columns) for columns in zip(*numbered, strict=True)))
+
+
+def _with_wheels(run: Log) -> Log:
+    if run.wheel_r is not None:
+        return run
+    return run._replace(wheel_r=np.full(len(run.t), np.nan), wheel_l=np.full(len(run.t), np.nan))
 
 
 def between(log: Log, first: float | None, last: float | None) -> Log:
@@ -194,19 +217,6 @@ def between(log: Log, first: float | None, last: float | None) -> Log:
     if not np.any(kept):
         raise InputError(f"no row between t = {first} and {last} s: the log runs from {t.min():g} to {t.max():g} s")
     return Log(*(np.asarray(column)[kept] for column in log))
-
-
-def repeats(log: Log) -> np.ndarray:
-    """Boolean (samples,): rows whose pose equals the one before in all three numbers."""
-    pose = np.stack([np.asarray(column) for column in log.pose])
-    same = np.concatenate([[False], np.all(pose[:, 1:] == pose[:, :-1], axis=0)])
-    return same & ~first_rows(log)
-
-
-def blind(log: Log, rows: Any) -> Log:
-    """The log without the poses of some rows, boolean (samples,)."""
-    x, y, theta = (np.where(rows, np.nan, column) for column in log.pose)
-    return log._replace(x=x, y=y, theta=theta)
 
 
 def run_begins(log: Log) -> np.ndarray:

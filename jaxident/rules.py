@@ -14,6 +14,8 @@ USUAL_STEP = 0.03
 """Step [s] between the poses of a usual camera, between which units are guessed."""
 FEWEST_STEPS = 20
 """Steps whose median tells a rate."""
+LARGEST_RUN = 2**53
+"""Beyond this double precision no longer tells one integer from the next."""
 
 
 class Rule(NamedTuple):
@@ -51,6 +53,30 @@ def pose_rules(pose: Pose) -> Iterator[Rule]:
     blind = np.isnan(np.stack(pose)).all(axis=0)
     for name, column in pose._asdict().items():
         yield Rule(name, ~np.isfinite(column) & ~blind, "a pose has three cells, or none where nothing was measured")
+
+
+def log_rules(log: Any, first: np.ndarray) -> Iterator[Rule]:
+    """What the columns of a log keep; first (rows,): where a run begins."""
+    yield Rule("run", ~(log.run == np.round(log.run)) | (np.abs(log.run) >= LARGEST_RUN), "it should be an integer")
+    starts = np.flatnonzero(first)
+    _, new = np.unique(log.run[starts], return_index=True)
+    again = np.zeros(len(first), bool)
+    again[np.delete(starts, new)] = True
+    yield Rule("run", again, "the rows of a run must stand together")
+    yield from rising_time(log.t, first)
+    last = np.append(first[1:], True)
+    for name, command in zip(("u_r", "u_l"), log.command, strict=True):
+        yield Rule(name, ~np.isfinite(command) & ~last, "only a run's last row may have no command")
+    yield from pose_rules(log.pose)
+    for name, speed in (("wheel_r", log.wheel_r), ("wheel_l", log.wheel_l)):
+        if speed is not None:
+            yield Rule(name, np.isinf(speed), "a wheel speed is finite, or empty where none was measured")
+
+
+def repeat_last(command: np.ndarray, run: np.ndarray) -> np.ndarray:
+    """Every missing command (rows,) replaced by the one of the row before, 0 where that row is of another run."""
+    before = np.concatenate([[0.0], np.where(run[1:] == run[:-1], command[:-1], 0.0)])
+    return np.where(np.isnan(command), before, command)
 
 
 def check_pose_rate(name: str, steps: Any) -> None:

@@ -4,51 +4,20 @@ import re
 
 import click
 
+from jaxident.cli.convert_options import FRAMES, ORDER, OffsetOption
 from jaxident.cli.progress import working
 from jaxident.cli.record import Recorded, origin, tell_origin
-from jaxident.cli.session import ColumnsOption, Number, above_zero, check_outputs, columns_option, table, warn, wrote
+from jaxident.cli.session import ColumnsOption, above_zero, check_outputs, columns_option, table, warn, wrote
 
 NEEDED = "give --commands CSV --poses CSV, or --bag PATH, or --log LOG"
 OFFSET_ADVICE = re.compile(r"jaxident convert --log LOG --pose-offset (\S+) --out NEW")
 """As `suspicions` words it."""
 
 
-class OffsetOption(Number):
-    """A time in seconds, or `auto`."""
-
-    name = "S|auto"
-
-    def convert(self, value, param, ctx):
-        """The time, or the word `auto`."""
-        if value == "auto":
-            return value
-        try:
-            return super().convert(float(value), param, ctx)
-        except ValueError:
-            self.fail(f"{value!r} is neither a time in seconds nor auto", param, ctx)
-
-
-class PairOption(click.ParamType):
-    """Two different words."""
-
-    def __init__(self, name: str, wanted: str) -> None:
-        self.name, self.wanted = name, wanted
-
-    def convert(self, value, param, ctx):
-        """Both words."""
-        words = tuple(word.strip() for word in value.split(",")) if isinstance(value, str) else value
-        if len(words) != 2 or not all(words) or words[0] == words[1]:
-            self.fail(f"{value!r} should be two {self.wanted}", param, ctx)
-        return words
-
-
-ORDER = PairOption("RIGHT,LEFT", "indices or joint names, the right wheel first, as in 1,0")
-FRAMES = PairOption("FIXED,ROBOT", "frames, the robot's last, as in map,base_link")
-
-
 @click.command("convert", cls=Recorded)
 @click.option("--commands", metavar="CSV", help="Columns t,v,w or t,u_r,u_l.")
 @click.option("--poses", metavar="CSV", help="Columns t,x,y,theta or t,x,y,qx,qy,qz,qw.")
+@click.option("--wheels", metavar="CSV", help="Columns t,wheel_r,wheel_l: measured wheel speeds [rad/s].")
 @click.option("--log", metavar="LOG", help="A finished log (file or folder) in place of both, for --pose-offset, "
               "--period and --columns.")  # fmt: skip
 @click.option("--bag", metavar="PATH", help="A ROS bag in place of both: .bag, .db3, .mcap or a ROS 2 folder.")
@@ -57,6 +26,8 @@ FRAMES = PairOption("FIXED,ROBOT", "frames, the robot's last, as in map,base_lin
 @click.option(
     "--pose-topic", metavar="T", help="PoseStamped, PoseWithCovarianceStamped, TransformStamped, tf, Odometry."
 )
+@click.option("--wheels-topic", metavar="T", help="JointState whose velocities are measured wheel speeds [rad/s].")
+@click.option("--wheel-joints", type=ORDER, help="Which joints of --wheels-topic are the wheels, the right one first.")
 @click.option("--child-frame", metavar="F", help="Of a tf topic: the frame that moves with the robot.")
 @click.option("--pose-frames", type=FRAMES, help="Compose tf from a fixed frame to the robot's, as in "
               "map,base_link.")  # fmt: skip
@@ -65,14 +36,18 @@ FRAMES = PairOption("FIXED,ROBOT", "frames, the robot's last, as in map,base_lin
 @columns_option
 @click.option("--command-columns", type=ColumnsOption(), default="", help="As --columns, for the commands alone.")
 @click.option("--pose-columns", type=ColumnsOption(), default="", help="As --columns, for the poses alone.")
+@click.option("--wheels-columns", type=ColumnsOption(), default="", help="As --columns, for the wheel speeds alone.")
 @click.option("--period", type=above_zero, metavar="S", help="Rows at this even period; without it one row per event.")
 @click.option("--track", type=above_zero, metavar="W", help="Distance between the wheels [m], for commands in v,w.")
 @click.option("--pose-offset", type=OffsetOption(), default="0", show_default=True, help="Time added to the poses'; "
               "auto finds it, a delay of the robot included.")  # fmt: skip
+@click.option("--wheels-offset", type=OffsetOption(), default="0", show_default=True, help="Time added to the wheel "
+              "speeds'; auto finds the one at which they fit the poses.")  # fmt: skip
 @click.option("--hold-timeout", type=above_zero, metavar="S", help="A command older than this counts as zero.")
 @click.option("--out", metavar="LOG", help="The log to write (.csv or .csv.gz).")
 def command(**chosen):
-    """Two streams, each with its own times, to one log; or a log to a better one. A topic's pose is never interpolated.
+    """Two streams, each with its own times, to one log, measured wheel speeds perhaps as a third; or a log to a better
+    one. A topic's pose is never interpolated.
 
     Example: jaxident convert --commands cmd.csv --poses mocap.csv --track 0.26 --period 0.05 --out log.csv
 
@@ -85,8 +60,6 @@ def command(**chosen):
     out = chosen["out"]
     if not out:
         raise click.UsageError("Missing option '--out': the log to write")
-    import numpy as np
-
     from jaxident.estimation.suspicions import log_suspicions
     from jaxident.files.logs import write_log
     from jaxident.files.origins import check_beside
@@ -100,18 +73,29 @@ def command(**chosen):
         write_log(log, out)
     for note in notes:
         click.echo(note)
-    own = chosen["columns"] | chosen["command_columns"] | chosen["pose_columns"]
+    own = chosen["columns"] | chosen["command_columns"] | chosen["pose_columns"] | chosen["wheels_columns"]
     lines = [_with_offset(line, offset, bool(chosen["log"])) for line in doubts]
     warn(_for_speeds(lines) if chosen["track"] else lines, own)
-    measured = np.count_nonzero(np.isfinite(log.x))
-    length = sum(run.t[-1] - run.t[0] for run in log.runs())
-    click.echo(f"{len(log.t)} rows, {measured} with a pose, {length:.6g} s")
+    click.echo(_counted(log))
     wrote(out)
     tell_origin(out, made)
 
 
+def _counted(log) -> str:
+    """What a log holds, in a line."""
+    import numpy as np
+
+    from jaxident.log import wheels_measured
+
+    poses, turning = np.count_nonzero(np.isfinite(log.x)), wheels_measured(log)
+    wheels = "" if turning is None else f", {np.count_nonzero(turning)} with both wheel speeds"
+    length = sum(run.t[-1] - run.t[0] for run in log.runs())
+    return f"{len(log.t)} rows, {poses} with a pose{wheels}, {length:.6g} s"
+
+
 STREAMS_ALONE = ("track", "hold_timeout", "command_columns", "pose_columns", "command_topic", "pose_topic",
-                 "child_frame", "pose_frames", "wheel_order", "bag_time")  # fmt: skip
+                 "child_frame", "pose_frames", "wheel_order", "bag_time", "wheels", "wheels_columns", "wheels_topic",
+                 "wheel_joints")  # fmt: skip
 """Options that a finished log has no use for."""
 
 
@@ -123,6 +107,12 @@ def _check_sources(chosen) -> None:
         raise click.UsageError(NEEDED)
     if chosen["child_frame"] and chosen["pose_frames"]:
         raise click.UsageError("--pose-frames FIXED,ROBOT names the robot's frame; leave --child-frame out")
+    if chosen["wheels"] and chosen["bag"]:
+        raise click.UsageError("--wheels CSV goes with --commands and --poses; of a bag give --wheels-topic T")
+    if (chosen["wheels_topic"] or chosen["wheel_joints"]) and not chosen["bag"]:
+        raise click.UsageError("--wheels-topic and --wheel-joints are for --bag PATH; beside CSV give --wheels CSV")
+    if chosen["wheel_joints"] and not chosen["wheels_topic"]:
+        raise click.UsageError("--wheel-joints names joints of --wheels-topic T, which is missing")
     if chosen["listing"] and not chosen["bag"]:
         raise click.UsageError("--list shows the topics of --bag PATH")
     foreign = next((name for name in STREAMS_ALONE if chosen["log"] and chosen[name]), None)
@@ -147,7 +137,10 @@ def _from_log(chosen):
 
     log = read_whole(chosen["log"], chosen["columns"])
     offset, told = _offset(chosen, lambda: estimate_log_offset(log))
-    return shift_poses(log, offset, chosen["period"]), offset, told
+    if chosen["wheels_offset"] == 0.0:
+        return shift_poses(log, offset, chosen["period"]), offset, told
+    log, wheels_told = _moved_wheels(chosen, shift_poses(log, offset))
+    return log, offset, (*told, *wheels_told)
 
 
 def _from_streams(chosen):
@@ -158,7 +151,34 @@ def _from_streams(chosen):
     given, seen, notes = _from_bag(chosen) if chosen["bag"] else _from_files(chosen)
     offset, told = _offset(chosen, lambda: estimate_offset(given, seen, chosen["track"]))
     settings = {name: chosen[name] for name in ("period", "track", "hold_timeout")}
-    return merge(given, seen, pose_offset=offset, **settings), offset, (*notes, *told)
+    log = merge(given, seen, wheels=_wheels(chosen), pose_offset=offset, **settings)
+    log, wheels_told = _moved_wheels(chosen, log)
+    return log, offset, (*notes, *told, *wheels_told)
+
+
+def _moved_wheels(chosen, log):
+    """The log with the offset of its wheel speeds that was asked for, and a line that tells one that was found."""
+    from jaxident.files.offset import estimate_wheels_offset
+    from jaxident.files.shifted import shift_wheels
+
+    if chosen["wheels_offset"] != "auto":
+        return shift_wheels(log, chosen["wheels_offset"], chosen["period"]), ()
+    offset, error = estimate_wheels_offset(log)
+    line = f"--wheels-offset {offset:.6f} (standard error {error:.1g} s)"
+    return shift_wheels(log, offset, chosen["period"]), (line,)
+
+
+def _wheels(chosen):
+    """The stream of measured wheel speeds, or None."""
+    from jaxident.files.bags import read_bag_wheels
+    from jaxident.files.streams import read_wheels
+
+    columns = chosen["columns"] | chosen["wheels_columns"]
+    if chosen["wheels"]:
+        return read_wheels(chosen["wheels"], columns)
+    if chosen["wheels_topic"]:
+        return read_bag_wheels(chosen["bag"], chosen["wheels_topic"], _choice(chosen), columns)
+    return None
 
 
 def _offset(chosen, estimate):
@@ -195,15 +215,21 @@ def _from_files(chosen):
 
 def _from_bag(chosen):
     from jaxident.files.bags import read_bag_streams
+
+    columns = chosen["columns"] | chosen["command_columns"] | chosen["pose_columns"]
+    return read_bag_streams(chosen["bag"], chosen["command_topic"], chosen["pose_topic"], _choice(chosen), columns)
+
+
+def _choice(chosen):
+    """What the options say of the topics of a bag."""
     from jaxident.files.messages import Choice
 
-    choice = Choice(chosen["child_frame"], chosen["wheel_order"], chosen["bag_time"], chosen["pose_frames"])
-    columns = chosen["columns"] | chosen["command_columns"] | chosen["pose_columns"]
-    return read_bag_streams(chosen["bag"], chosen["command_topic"], chosen["pose_topic"], choice, columns)
+    names = ("child_frame", "wheel_order", "bag_time", "pose_frames", "wheel_joints")
+    return Choice(*(chosen[name] for name in names))
 
 
 def _list(bag) -> None:
-    from jaxident.files.bags import list_topics
+    from jaxident.files.bag_topics import list_topics
 
     rows = [
         (one.name, one.type, str(one.messages), f"{one.rate:.4g}" if one.rate > 0 else "", one.suits)

@@ -34,6 +34,10 @@ NOTES = {
     "maximum-likelihood": "Intervals hold under the noise law above; all poses were used, start states estimated.",
 }
 
+BOTH_SENSORS = (
+    " Wheel speeds were used as a second sensor: wheel_radius and wheel_track [m], and their noise [rad/s], stand last."
+)
+
 
 @click.command("identify", cls=Recorded)
 @click.argument("logs", nargs=-1, required=True, metavar="LOG...")
@@ -171,6 +175,6 @@ def _say(found, rows, method: str, again) -> None:
         beside = ["bootstrap", *interval_cells(again)]
         lines = [(*line[:3], own, line[3]) for line, own in zip(lines, beside, strict=True)]
     click.echo(table(lines))
-    click.echo(NOTES[method])
+    click.echo(NOTES[method] + (BOTH_SENSORS if found.model.wheels is not None else ""))
     if again:
         click.echo(describe(again))

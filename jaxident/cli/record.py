@@ -11,7 +11,7 @@ import click
 
 from jaxident.cli.session import wrote
 
-READ = ("logs", "log", "sim", "model", "inputs", "commands", "poses", "bag", "study", "diagnosis")
+READ = ("logs", "log", "sim", "model", "inputs", "commands", "poses", "wheels", "bag", "study", "diagnosis")
 """Names of the parameters that stand for files or folders which are read."""
 WRITTEN = ("out", "json_file", "report")
 """Names of those that stand for outputs: they are in no origin, or the same result in another folder would differ."""

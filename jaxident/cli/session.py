@@ -27,6 +27,7 @@ class Number(click.FloatRange):
 
 
 above_zero = Number(0, min_open=True)
+not_negative = Number(0)
 rows_option = click.IntRange(1, MOST_ROWS)
 json_option = click.option("--json", "json_file", metavar="FILE", help="Also write the result here, for programs.")
 

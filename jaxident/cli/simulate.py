@@ -4,7 +4,16 @@ import click
 
 from jaxident.cli.progress import working
 from jaxident.cli.record import Recorded, origin, tell_origin
-from jaxident.cli.session import MOST_ROWS, above_zero, check_outputs, effect_option, rows_option, seed_option, wrote
+from jaxident.cli.session import (
+    MOST_ROWS,
+    above_zero,
+    check_outputs,
+    effect_option,
+    not_negative,
+    rows_option,
+    seed_option,
+    wrote,
+)
 from jaxident.start import start_jax
 
 EXCITATION_NAMES = ("staircase", "multilevel", "prbs", "multisine", "chirp")
@@ -35,13 +44,18 @@ class Noise(click.ParamType):
 @click.option("--hold", type=rows_option, default=20, show_default=True, help="Samples that a level lasts.")
 @effect_option
 @click.option("--noise", type=Noise(), help="Camera noise in metres and radians; without it the log is noise-free.")
+@click.option("--wheel-noise", type=not_negative, metavar="SD", help="Wheel speeds too, with white noise [rad/s].")
+@click.option("--wheel-radius", type=above_zero, metavar="R", help="Of the wheels [m] (default: as the model says).")
+@click.option("--wheel-track", type=above_zero, metavar="W", help="Between the wheels [m] (default: as the model says, "
+              "or as its gains do).")  # fmt: skip
 @click.option("--out", required=True, metavar="LOG", help="The log to write (.csv or .csv.gz).")
 @seed_option
-def command(model, inputs, excitation, samples, amplitude, hold, effects, noise, out, seed):
+def command(model, inputs, excitation, samples, amplitude, hold, effects, noise, out, seed, **wheels):
     """A synthetic log of MODEL, a model file or `published`.
 
     Random slip and the noise's correlation time come from the model file, and count only with --noise. Effects join
-    those of the model file, in whose place they stand where both have one; `jaxident effects` lists them.
+    those of the model file, in whose place they stand where both have one; `jaxident effects` lists them. A model with
+    `wheels` gives exact wheel speeds unless --wheel-noise is given.
 
     Example: jaxident simulate published --excitation staircase --samples 2000 --noise 0.001,0.01
     --effect transport_delay:delay=0.05 --out log.csv
@@ -62,13 +76,30 @@ def command(model, inputs, excitation, samples, amplitude, hold, effects, noise,
     check_outputs(out)
     check_beside(out)
     made = origin("--out")
-    robot = with_effects(load_model(model), effects)
+    robot = _with_wheels(with_effects(load_model(model), effects), **wheels)
     key_input, key_noise = jax.random.split(jax.random.key(seed))
     with working("simulating"):
         if inputs is None:
             log = excite(key_input, excitation, samples, robot.sample_period, amplitude=amplitude, hold=hold)
         else:
             log = read_log(inputs)
-        write_log(simulate_runs(robot, log, noise=noise, key=key_noise), out)
+        own = wheels["wheel_noise"] or 0.0
+        write_log(simulate_runs(robot, log, noise=noise, wheel_noise=own, key=key_noise), out)
     wrote(out)
     tell_origin(out, made)
+
+
+def _with_wheels(robot, wheel_noise, wheel_radius, wheel_track):
+    """The robot with the sensor of wheel speeds that the options ask for."""
+    import dataclasses
+
+    from jaxident.export.wheels import robot_of
+    from jaxident.robot.wheel_sensor import WheelSensor
+
+    if robot.wheels is None and wheel_radius is None and (wheel_noise is not None or wheel_track is not None):
+        raise click.UsageError("wheel speeds need --wheel-radius R: this model has no wheels")
+    if robot.wheels is None and wheel_radius is None:
+        return robot
+    known = robot.wheels or WheelSensor(None, None)
+    track = wheel_track or known.track or robot_of(robot).track
+    return dataclasses.replace(robot, wheels=WheelSensor(wheel_radius or known.radius, track))

@@ -41,6 +41,11 @@ class Parameter(NamedTuple):
     standard_deviation: float
 
 
+UNUSED_WHEELS = (
+    "wheel speeds are not used: a diagnosis judges by the poses alone so far; `jaxident identify` uses both sensors"
+)
+
+
 class Diagnosis(NamedTuple):
     """What `diagnose` found. verdict: "no_gap", "parameters", "effects", "partly", "unknown" or "undecided". selected:
     the named effects, in the order in which they were accepted. visible: the gain that each effect of typical size
@@ -110,9 +115,14 @@ def diagnose(
     parameters = compare_parameters(prepared, finding, told, common)
     verdict = decide(prepared, judgement, selected, parameters)
     nominal = to_model(prepared, finding.nominal.vector, finding.law, (), None, finding.nominal)
-    return Diagnosis(verdict, judgement, gap, account, where, selected, parameters, visible(known),
-                     replay(known, seed), advice(verdict, judgement, laws), nominal, corrected, shrinks, prepared,
-                     finding, surplus, simulator, laws, log_suspicions(join(logs)))  # fmt: skip
+    return Diagnosis(verdict, judgement, gap, account, where, selected, parameters, visible(known), replay(known, seed),
+                     advice(verdict, judgement, laws), nominal, corrected, shrinks, prepared, finding, surplus,
+                     simulator, laws, (*log_suspicions(join(logs)), *unused_wheels(logs)))  # fmt: skip
+
+
+def unused_wheels(logs: Log | Sequence[Log]) -> tuple[str, ...]:
+    """A line for logs with wheel speeds, which a diagnosis does not use yet."""
+    return () if join(logs).wheel_r is None else (UNUSED_WHEELS,)
 
 
 def check_nominal(logs: Log | Sequence[Log], sim: Log | Sequence[Log] | None, model: Model | None) -> None:

@@ -7,7 +7,8 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.refit import Solution
 from jaxident.diagnosis.motion.windows import Windows
-from jaxident.log import Log, repeats
+from jaxident.estimation.observations import repeats
+from jaxident.log import Log
 
 OUTLYING, LESS_OUTLYING = 7.0, 4.5
 """Standard deviations by which a pose leaves those nearby before it is an outlier; fewer suffice where a log is known

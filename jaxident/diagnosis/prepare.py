@@ -22,8 +22,9 @@ from jaxident.diagnosis.roles import split
 from jaxident.effects.coordinates import neutral_vector
 from jaxident.errors import InputError
 from jaxident.estimation.checks import check_informative
+from jaxident.estimation.observations import blind, poses_only
 from jaxident.estimation.stretches import Starts
-from jaxident.log import Log, blind, join, run_begins
+from jaxident.log import Log, join, run_begins
 
 BURN = 20
 """Rows from which a window's start state is estimated before the horizon begins."""
@@ -77,7 +78,7 @@ def prepare(
     given = join(logs)
     check_informative(given)
     largest = float(np.nanmax(np.abs(np.stack(given.command)))) if like is None else like.largest
-    log = given._replace(u_r=np.asarray(given.u_r) / largest, u_l=np.asarray(given.u_l) / largest)
+    log = poses_only(given)._replace(u_r=np.asarray(given.u_r) / largest, u_l=np.asarray(given.u_l) / largest)
     period = float(np.median(np.concatenate([np.diff(run.t) for run in log.runs()])))
     rows, horizon = horizon_rows(horizon, period)
     roles = split(log, BURN + rows)

@@ -77,6 +77,28 @@ def run_undisturbed(
     laws: Laws | None = None,
 ) -> Pose:
     """`run_full` before `disturb`: poses (samples,) as the camera would report them if it made no random error."""
+    true = run_states(drive, dead_zone, vector, t, command, start, noise=noise, key=key, session_time=session_time,
+                      substeps=substeps, parts=parts, laws=laws).pose  # fmt: skip
+    settings = with_laws(_settings(vector, parts), laws)
+    return shifted(settings, seen(settings, true), true)
+
+
+def run_states(
+    drive,
+    dead_zone,
+    vector,
+    t,
+    command: Wheels,
+    start: State,
+    *,
+    noise,
+    key,
+    session_time=0.0,
+    substeps,
+    parts,
+    laws: Laws | None = None,
+) -> State:
+    """The robot's own states (samples,) of `run_full`. Without `noise` nothing slips at random."""
     settings = with_laws(_settings(vector, parts), laws)
     sent = _sent(settings, command, None if key is None else _keys(key))
     grid = _grid(settings, t, sent, session_time, substeps)
@@ -85,8 +107,7 @@ def run_undisturbed(
         drawn = slip(noise, draw_noise(key, len(t)), jnp.append(jnp.diff(t), 1.0))
         push_aside = Force(*(f[grid.row] for f in drawn))
     states = _scan(settings, drive, dead_zone, grid, push_aside, start, session_time - t[0])
-    true = Pose(*(column[grid.at_row] for column in states.pose))
-    return shifted(settings, seen(settings, true), true)
+    return State(*(column[grid.at_row] for column in states))
 
 
 def disturb(pose: Pose, vector: Array, t: Array, *, noise: Noise | None, key: Array, parts: frozenset[str]) -> Pose:

@@ -5,14 +5,16 @@ from functools import partial
 import jax
 import numpy as np
 
-from jaxident.array_types import AT_REST, Array, Pose, State
+from jaxident.array_types import AT_REST, Array, Pose, State, Wheels
 from jaxident.effects.catalogue import CATALOGUE, to_vector
 from jaxident.effects.checks import check_delay, check_effects
 from jaxident.effects.discovered import check_discovered, laws_of
-from jaxident.effects.full import run_full, substeps_for
+from jaxident.effects.full import run_full, run_states, substeps_for
+from jaxident.errors import InputError
 from jaxident.log import Log
 from jaxident.robot import simulate as nominal
 from jaxident.robot.model import Model, require_physical
+from jaxident.robot.wheel_sensor import measure_wheels
 
 
 def simulate(
@@ -24,9 +26,15 @@ def simulate(
     act. session_time [s]: at the first row, for effects that drift. Steps may differ for a physical model; a model
     of free numerators takes no effects and refuses a log of another or an uneven period. InputError for these, for a
     log of several runs, and for effects that `check_effects` refuses. Differentiable in the model and the start.
+
+    A model with `wheels` gives wheel speeds too, with their noise if there is a key. InputError for one of free
+    numerators, and for an effect under which a wheel slides: how fast it turns then is not simulated.
     """
+    if model.wheels is not None:
+        _check_wheels(model)
     if not (model.effects or model.discovered):
-        return nominal.simulate(model, log, start=start, key=key)
+        made = nominal.simulate(model, log, start=start, key=key)
+        return made if model.wheels is None else _with_wheels(model, made, start, key, session_time)
     check_effects(model.effects)
     check_discovered(model.discovered)
     nominal.check_one_run(log)
@@ -38,12 +46,36 @@ def simulate(
     vector = to_vector(model.effects)
     pose = _poses(model.dynamics, model.dead_zone, vector, log, start, model.noise, key, session_time,
                   laws_of(model.discovered), substeps=substeps_for(parts), parts=parts)  # fmt: skip
-    return log._replace(x=pose.x, y=pose.y, theta=pose.theta)
+    made = log._replace(x=pose.x, y=pose.y, theta=pose.theta, wheel_r=None, wheel_l=None)
+    return made if model.wheels is None else _with_wheels(model, made, start, key, session_time)
 
 
 def is_random(model: Model) -> bool:
     """Whether one of the model's effects needs a key to act."""
     return any(CATALOGUE[effect.name].random for effect in model.effects)
+
+
+def _check_wheels(model: Model) -> None:
+    require_physical(model)
+    sliding = next((effect.name for effect in model.effects if CATALOGUE[effect.name].stage == "grip"), None)
+    if sliding is not None:
+        raise InputError(f"wheels: under {sliding} a wheel slides, and how fast it turns then is not simulated; leave "
+                         "out the wheel speeds, or the effect")  # fmt: skip
+
+
+def _with_wheels(model: Model, log: Log, start: State, key: Array | None, session_time: Array) -> Log:
+    """The log with the wheel speeds of a model that has the sensor: those of its drive, to which nothing slips."""
+    parts = frozenset(effect.name for effect in model.effects)
+    wheels = _wheels(model.dynamics, model.dead_zone, to_vector(model.effects), log, start, key, session_time,
+                     laws_of(model.discovered), model.wheels, substeps=substeps_for(parts), parts=parts)  # fmt: skip
+    return log._replace(wheel_r=wheels.right, wheel_l=wheels.left)
+
+
+@partial(jax.jit, static_argnames=("substeps", "parts"))
+def _wheels(drive, dead_zone, vector, log: Log, start, key, session_time, laws, sensor, *, substeps, parts) -> Wheels:
+    states = run_states(drive, dead_zone, vector, log.t, log.command, start, noise=None, key=key,
+                        session_time=session_time, substeps=substeps, parts=parts, laws=laws)  # fmt: skip
+    return measure_wheels(sensor, states.v, states.w, key)
 
 
 @partial(jax.jit, static_argnames=("substeps", "parts"))

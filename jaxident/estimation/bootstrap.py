@@ -29,7 +29,7 @@ from jaxident.estimation.parameters import Law, Robot, from_vector, names, to_ve
 from jaxident.estimation.precision import law_of, natural_values
 from jaxident.estimation.prior import Prior
 from jaxident.estimation.replicate import replicate_run
-from jaxident.estimation.runs import Runs, run_axes, stack_runs
+from jaxident.estimation.runs import Runs, run_axes, stack_runs, with_wheels
 from jaxident.estimation.scoring import Point, search_from
 from jaxident.log import Log, join
 from jaxident.numerics import require_float64, safe_divide
@@ -86,8 +86,8 @@ def bootstrap(
         raise InputError(f"bootstrap: {count} replicates; a standard deviation needs at least {SMALLEST_COUNT}")
     log = join(logs)
     largest = float(np.nanmax(np.abs(np.stack(log.command))))
-    runs = stack_runs(log)
-    law = law_of(found.fit.robot.drive, found.fit.robot.noise)
+    runs = _runs_of(log, found.fit.robot, resample)
+    law = law_of(found.fit.robot.drive, found.fit.robot.noise, runs.wheels is not None)
     fitted = found.fit.robot, found.fit.starts, found.fit.innovations.normalised
     _check(resample, runs, block)
     if resample == "blocks":
@@ -102,6 +102,15 @@ def bootstrap(
     values, ok, _ = refit(keys, robot, begins, innovation, runs, limit, law, block, prior)
     estimate = np.asarray(natural_values(robot, law))
     return summarise(estimate, np.asarray(values), np.asarray(ok), names(law), resample, block)
+
+
+def _runs_of(log: Log, robot: Robot, resample: str) -> Runs:
+    """The runs of a log with the sensors that a fit has used."""
+    if robot.wheels is None:
+        return stack_runs(log)
+    if resample == "blocks":
+        raise InputError("bootstrap: blocks of residuals are drawn of poses alone; with wheel speeds draw whole 'runs'")
+    return with_wheels(stack_runs(log), log)
 
 
 def _check(resample: str, runs: Runs, block: int | None) -> None:

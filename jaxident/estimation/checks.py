@@ -4,6 +4,8 @@ import numpy as np
 
 from jaxident.errors import InputError
 from jaxident.estimation.suspicions import misread_heading
+from jaxident.estimation.wheel_answer import answer_of_wheels, told
+from jaxident.estimation.wheel_suspicions import wheels_turn
 from jaxident.log import Log
 from jaxident.rules import check_pose_rate
 
@@ -30,7 +32,18 @@ def check_informative(log: Log) -> None:
             "by 1.8 rad: they are noise, or of a robot that turns faster than the camera sees"
         )
     if not moves(log, seen):
-        raise InputError("nothing moves: the poses are at rest within the camera's noise while the commands change")
+        raise InputError(
+            "nothing moves: the poses are at rest within the camera's noise while the commands change"
+            + (_in_the_air(log) if wheels_turn(log) else "")
+        )
+
+
+def _in_the_air(log: Log) -> str:
+    """What wheels tell that turn while nothing moves."""
+    answer = answer_of_wheels(log)
+    return "; its wheels turn: are they in the air? A log on the ground shows how the robot moves" + (
+        "" if answer is None else f" ({told(answer)})"
+    )
 
 
 def _turn(log: Log, seen: np.ndarray) -> float:

@@ -17,8 +17,10 @@ from jaxident.estimation.identify_poses import identify_poses
 from jaxident.estimation.identify_recursive import identify_recursively
 from jaxident.estimation.maximum_likelihood import Fit
 from jaxident.estimation.more_noise import camera_error, moves
+from jaxident.estimation.observations import poses_only
 from jaxident.estimation.suspicions import log_suspicions
 from jaxident.estimation.verdict import at_bound, bound_doubts
+from jaxident.estimation.wheel_suspicions import check_wheels
 from jaxident.log import Log, even_period, join
 from jaxident.numerics import require_float64
 from jaxident.robot.difference import Difference
@@ -65,30 +67,47 @@ def identify(
 
     method "maximum-likelihood": physical parameters from whole runs, uneven or not, under a noise_law "white", "ar1",
     "slip", "slip-ar1" or, by default, "auto": white unless its residuals are coloured, then the likeliest; with
-    `coupling` of the two speeds if asked for. method "paper": batch initialisation on the setup time (section VI), then
-    recursive least squares (15)-(18) over the rest of an even log. Its settings: setup_time [s] from the start
-    (default: 200 samples or three tenths, whichever is more); forgetting in (0, 1] (default 1); reading of (21):
-    "one_step" (default), as the recursion reads it and best on real robots, or "free_run". methods
-    "instrumental-variables" (one even run without gaps) and "key-term-least-squares" (even runs): yardsticks, the same
-    equations from all samples at once. d_max bounds the dead zones [unit of the command] (default: 0.9 of the largest
-    command). Needs double precision; InputError says what a log lacks, WorkError that the result is not finite.
+    `coupling` of the two speeds if asked for; wheel speeds count as well unless they contradict the camera. method
+    "paper": batch initialisation on the setup time (section VI), then recursive least squares (15)-(18) over the rest
+    of an even log. Its settings: setup_time [s] from the start (default: 200 samples or three tenths, whichever is
+    more); forgetting in (0, 1] (default 1); reading of (21): "one_step" (default), best on real robots, or "free_run".
+    methods "instrumental-variables" (one even run without gaps) and "key-term-least-squares" (even runs): yardsticks,
+    the same equations from all samples at once. d_max bounds the dead zones [unit of the command] (default: 0.9 of the
+    largest command). Needs double precision; InputError says what a log lacks, WorkError that nothing finite comes out.
     """
     require_float64("identify")
     _check_method(method, coupling, {"setup time": setup_time, "forgetting": forgetting, "reading": reading})
-    log = join(logs)
-    check_informative(log)
+    log, doubts = _chosen_sensors(join(logs), method)
     largest = float(np.nanmax(np.abs(np.stack(log.command))))
     d_max = D_MAX_SHARE * largest if d_max is None else d_max
     check_settings(1.0 if forgetting is None else forgetting, d_max, largest)
     if method != "maximum-likelihood":
-        again = partial(_identify_by_yardstick, method=method, d_max=d_max)
-        if method not in YARDSTICKS:
-            settings = setup_time, 1.0 if forgetting is None else forgetting, reading or "one_step"
-            again = partial(_identify_as_paper, d_max=d_max, settings=settings)
-        return _with_bounds(_with_moves(again(log), log, again)._replace(suspicions=log_suspicions(log)), d_max)
+        settings = setup_time, 1.0 if forgetting is None else forgetting, reading or "one_step"
+        again = partial(_identify_as_paper, d_max=d_max, settings=settings)
+        if method in YARDSTICKS:
+            again = partial(_identify_by_yardstick, method=method, d_max=d_max)
+        found = _with_moves(again(log), log, again)._replace(suspicions=log_suspicions(log))
+    else:
+        found = _identify_by_likelihood(log, d_max, noise_law, coupling)
+    return _with_bounds(found._replace(suspicions=(*found.suspicions, *doubts)), d_max)
+
+
+def _identify_by_likelihood(log: Log, d_max: float, noise_law: str, coupling: bool) -> Identification:
     found = identify_poses(log, d_max, noise_law, coupling)
     every = found.model, found.model.covariance, found.residuals, found.fit.ok
-    return _with_bounds(Identification(*every, fit=found.fit, suspicions=found.suspicions), d_max)
+    return Identification(*every, fit=found.fit, suspicions=found.suspicions)
+
+
+def _chosen_sensors(log: Log, method: str) -> tuple[Log, tuple[str, ...]]:
+    """The log without wheel speeds that the method or the camera has no use for, and what is to be said of them;
+    InputError for a log that shows nothing."""
+    check_informative(log)
+    if log.wheel_r is None or not np.isfinite([log.wheel_r, log.wheel_l]).any():
+        return poses_only(log), ()
+    if method != "maximum-likelihood":
+        return poses_only(log), (f"wheel speeds are not used: the method {method} knows poses alone",)
+    check = check_wheels(log)
+    return log if check.usable else poses_only(log), check.lines
 
 
 def _with_moves(found: Identification, log: Log, again: Callable[[Log], Identification]) -> Identification:

@@ -14,10 +14,12 @@ from jaxident.estimation.noise_law import WHITE, colour, fit_law
 from jaxident.estimation.parameters import Law, names, to_vector
 from jaxident.estimation.precision import difference_covariance, spread_of
 from jaxident.estimation.prior import RATE, from_prior
-from jaxident.estimation.runs import Runs, stack_runs
+from jaxident.estimation.runs import Runs, stack_runs, with_wheels
 from jaxident.estimation.suspicions import log_suspicions, odometry_suspicions
+from jaxident.estimation.wheel_suspicions import wheel_colour
 from jaxident.log import Log
 from jaxident.robot.model import Model, Provenance
+from jaxident.robot.wheel_sensor import WheelSensor
 
 SMALLEST_LOG = 20
 COASTED = (
@@ -48,6 +50,8 @@ def identify_poses(log: Log, d_max: float, noise_law: str, coupling: bool) -> Po
         raise InputError(f"{len(log.t)} rows, {measured} with a pose: maximum likelihood needs at least {SMALLEST_LOG}")
     log = _with_commands(log)
     runs = stack_runs(log)
+    if log.wheel_r is not None:
+        runs = with_wheels(runs, log)
     fit, law = fit_law(jax.tree.map(jnp.asarray, runs), jnp.asarray(d_max), noise_law, coupling)
     if not all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves((fit.robot, fit.covariance))):
         raise WorkError("the maximum-likelihood estimate is not finite: the log does not determine the model")
@@ -80,6 +84,7 @@ def _model(fit: Fit, law: Law, period: float) -> Model:
         standard_deviation=spread_of(fit.covariance, difference, law),
         covariance=fit.covariance,
         parameter_order=names(law),
+        wheels=None if fit.robot.wheels is None else WheelSensor(*map(float, fit.robot.wheels)),
         provenance=Provenance(method="maximum-likelihood", from_prior=from_prior(np.asarray(fit.prior_share), law)),
     )
 
@@ -99,6 +104,8 @@ def _suspicions(fit: Fit, law: Law, runs: Runs, noise_law: str) -> tuple[str, ..
         )
     if fit.prior is not None and np.any(fit.prior.held):
         lines.append(COASTED)
+    if law.wheels:
+        lines += wheel_colour(fit.innovations.turning, runs.turning)
     found = colour(fit, runs)
     if not found < WHITE:
         tried = "no noise law makes them white, so the model may lack something: `jaxident diagnose` looks for it"

@@ -3,6 +3,7 @@
 -log p = sum over measured poses of (z^2 + log s) / 2 + constant, z = innovation / sqrt(s), s its variance. Without
 slip the states follow from the start state alone; the innovation of white camera error is then the pose error, and
 that of AR(1) error is e_k - rho e_j, rho = exp(-(t_k - t_j) / tau), s = sd^2 (1 - rho^2), j the last pose seen before.
+Measured wheel speeds add terms of the same form (`wheel_likelihood`).
 """
 
 from typing import Any, NamedTuple
@@ -12,8 +13,9 @@ import jax.numpy as jnp
 
 from jaxident.array_types import Array, Pose, State, Wheels
 from jaxident.estimation.filter import filter_run
-from jaxident.estimation.parameters import Law, from_vector
+from jaxident.estimation.parameters import Law, from_vector, names
 from jaxident.estimation.runs import Runs, row_times
+from jaxident.estimation.wheel_likelihood import wheel_residuals
 from jaxident.numerics import wrap
 from jaxident.robot.dead_zone import effective_command
 from jaxident.robot.drive import force, hold
@@ -21,10 +23,19 @@ from jaxident.robot.simulate import run_forces
 
 
 class Innovations(NamedTuple):
-    """Normalised innovations and logarithms of their variances, each (3, rows) for x, y, theta; 0 where unseen."""
+    """Normalised innovations and logarithms of their variances, each (3, rows) for x, y, theta; 0 where unseen.
+    turning, turning_log_variance (2, rows): the same of both wheels' speeds, None without them."""
 
     normalised: Any
     log_variance: Any
+    turning: Any = None
+    turning_log_variance: Any = None
+
+    def flat(self, *tail: int) -> list[Any]:
+        """All innovations and all log variances, one after the other, (numbers, *tail); slopes have a tail."""
+        pairs = (self.normalised, self.turning), (self.log_variance, self.turning_log_variance)
+        kept = [[part.reshape(-1, *tail) for part in pair if part is not None] for pair in pairs]
+        return [parts[0] if len(parts) == 1 else jnp.concatenate(parts) for parts in kept]
 
 
 def innovations(vector: Array, start: Array, run: Runs, law: Law) -> Innovations:
@@ -32,8 +43,9 @@ def innovations(vector: Array, start: Array, run: Runs, law: Law) -> Innovations
     robot = from_vector(vector, law)
     pull = force(robot.drive, effective_command(Wheels(*run.command), robot.dead_zone))
     solution = hold(robot.drive, run.step if jnp.ndim(run.step) == 0 else run.step[:-1])
+    turning = wheel_residuals(robot, run_forces(solution, pull, State(*start)), run) if law.wheels else (None, None)
     if law.slip:
-        return Innovations(*filter_run(solution, pull, State(*start), robot.noise, run))
+        return Innovations(*filter_run(solution, pull, State(*start), robot.noise, run), *turning)
     pose = run_forces(solution, pull, State(*start)).pose
     error = pose_error(run.pose, pose)
     sd = jnp.stack([robot.noise.position, robot.noise.position, robot.noise.heading])[:, None]
@@ -43,12 +55,28 @@ def innovations(vector: Array, start: Array, run: Runs, law: Law) -> Innovations
         fresh = 1.0 - memory**2
         error = (error - memory * error[:, last]) / jnp.sqrt(fresh)
         log_variance = log_variance + jnp.log(fresh)
-    return Innovations(*(jnp.where(run.seen, value, 0.0) for value in (error / sd, log_variance)))
+    return Innovations(*(jnp.where(run.seen, value, 0.0) for value in (error / sd, log_variance)), *turning)
 
 
 def pose_error(measured: Pose, pose: Pose) -> Array:
     """Measured minus modelled pose (3, ...) [m, m, rad], the heading wrapped."""
     return jnp.stack([measured.x - pose.x, measured.y - pose.y, wrap(measured.theta - pose.theta)])
+
+
+def deviation_steps(found: Innovations, runs: Runs, law: Law) -> Array:
+    """What to add to a vector (unknowns,) so that the deviations of white errors stand at their optimum, all else as it
+    is: in closed form from the innovations of all runs (runs, 3, rows). The camera's have none with slip."""
+    step = jnp.zeros(len(names(law)))
+    if not law.slip:
+        squares = jnp.sum(found.normalised**2, axis=(0, 2))
+        count = jnp.maximum(jnp.sum(runs.seen), 1)
+        mean = jnp.stack([0.5 * (squares[0] + squares[1]), squares[2]]) / count
+        first = names(law).index("position")
+        step = step.at[first : first + 2].set(0.5 * jnp.log(jnp.maximum(mean, 1e-30)))
+    if law.wheels:
+        mean = jnp.sum(found.turning**2) / jnp.maximum(jnp.sum(jnp.stack(runs.turning)), 1)
+        step = step.at[names(law).index("wheel_noise")].set(0.5 * jnp.log(jnp.maximum(mean, 1e-30)))
+    return step
 
 
 def negative_log_likelihood(found: Innovations) -> Array:

@@ -14,6 +14,7 @@ from jaxident.estimation.prior import Prior, prior_of
 from jaxident.estimation.runs import Runs, cut_windows, run_axes
 from jaxident.estimation.scoring import Point, Search, search_from, with_prior
 from jaxident.estimation.starter import Start, channels, first_estimate, start_states
+from jaxident.estimation.wheel_likelihood import first_sensor
 from jaxident.numerics import in_blocks
 from jaxident.robot.drive import Physical
 from jaxident.robot.noise import Noise
@@ -68,15 +69,18 @@ def _begin(runs: Runs, d_max: Array) -> Beginning:
     return Beginning(estimate, start_states(estimate, pair, windows)[::per_run])
 
 
-def first_point(beginning: Beginning, step: Array, law: Law) -> Point:
+def first_point(beginning: Beginning, runs: Runs, law: Law) -> Point:
     """The point of a beginning under a law: residuals as camera noise, a memory of two steps [s], slip that adds a
-    tenth of the residual per step."""
+    tenth of the residual per step, wheels as their speeds tell beside that robot's."""
     estimate, starts = beginning
     position, heading = jnp.maximum(estimate.residual, 1e-9)
-    slip = 0.1 / jnp.mean(step) ** 1.5
-    noise = Noise(position, heading, 2.0 * jnp.mean(step), slip * position, slip * heading)
+    slip = 0.1 / jnp.mean(runs.step) ** 1.5
+    noise = Noise(position, heading, 2.0 * jnp.mean(runs.step), slip * position, slip * heading)
     drive = Physical(estimate.rate, estimate.gain, jnp.zeros(2) if law.coupling else None)
-    return Point(to_vector(Robot(drive, estimate.dead_zone, noise), law), starts)
+    robot = Robot(drive, estimate.dead_zone, noise)
+    if law.wheels:
+        robot = robot._replace(wheels=first_sensor(robot, starts, runs))
+    return Point(to_vector(robot, law), starts)
 
 
 def fit_runs(runs: Runs, d_max: Array, law: Law = WHITE, prior: Prior | None = None) -> Fit:
@@ -90,7 +94,7 @@ def fit_runs(runs: Runs, d_max: Array, law: Law = WHITE, prior: Prior | None = N
 @partial(jax.jit, static_argnames=("law",))
 def fit_from(beginning: Beginning, runs: Runs, d_max: Array, law: Law, prior: Prior) -> Fit:
     """The estimate by a search from a given beginning."""
-    search = search_from(first_point(beginning, runs.step, law), runs, law, d_max, MOST_STEPS, prior)
+    search = search_from(first_point(beginning, runs, law), runs, law, d_max, MOST_STEPS, prior)
     covariance, share = posterior_at(search.point, search.local, law, prior)
     value = with_prior(search.local, search.point.shared, law, prior, -1.0).value
     found = jax.vmap(lambda start, run: innovations(search.point.shared, start, run, law), in_axes=(0, run_axes(runs)))(
@@ -100,7 +104,7 @@ def fit_from(beginning: Beginning, runs: Runs, d_max: Array, law: Law, prior: Pr
         robot=from_vector(search.point.shared, law),
         starts=search.point.starts,
         covariance=covariance,
-        log_likelihood=-value - 1.5 * jnp.sum(runs.seen) * jnp.log(2.0 * jnp.pi),
+        log_likelihood=-value - 0.5 * numbers_in(runs, law) * jnp.log(2.0 * jnp.pi),
         innovations=found,
         ok=search.arrived & _regular(search, covariance, runs),
         steps=search.steps,
@@ -114,3 +118,9 @@ def _regular(search: Search, covariance: Array, runs: Runs) -> Array:
     finite = [jnp.all(jnp.isfinite(part)) for part in (*search.point, search.local.value, covariance)]
     unknowns = search.point.shared.size + search.point.starts.size
     return jnp.all(jnp.stack(finite)) & (3 * jnp.sum(runs.seen) > unknowns)
+
+
+def numbers_in(runs: Runs, law: Law) -> Array:
+    """How many measured numbers a law explains: three of each pose, and with wheels each wheel speed."""
+    poses = 3 * jnp.sum(runs.seen)
+    return poses + jnp.sum(jnp.stack(runs.turning)) if law.wheels else poses

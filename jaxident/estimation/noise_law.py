@@ -6,7 +6,7 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.errors import InputError
-from jaxident.estimation.maximum_likelihood import Beginning, Fit, begin, fit_from
+from jaxident.estimation.maximum_likelihood import Beginning, Fit, begin, fit_from, numbers_in
 from jaxident.estimation.parameters import Law, names
 from jaxident.estimation.prior import RATE, RATE_SPREAD, SIGNS, Prior, middle_gain, prior_of
 from jaxident.estimation.residual_tests import whiteness
@@ -37,20 +37,22 @@ def fit_law(runs: Runs, d_max: Array, noise_law: str, coupling: bool) -> tuple[F
 
     "auto" keeps white camera error if the residuals of that fit are white or rounding; otherwise it adds a memory or
     slip, and where that leaves them coloured too, both. Of what it has tried it takes the lowest Bayesian information
-    criterion (Schwarz 1978). A fit of a robot that coasts is made again; see `settling_fit`.
+    criterion (Schwarz 1978). A fit of a robot that coasts is made again; see `settling_fit`. Runs with wheel speeds are
+    fitted to both sensors.
     """
     if noise_law not in (*NOISE_LAWS, "auto"):
         raise InputError(f"noise law {noise_law!r}: choose from {', '.join((*NOISE_LAWS, 'auto'))}")
     beginning, prior = begin(runs, d_max), prior_of(runs)
+    terms = {"coupling": coupling, "wheels": runs.wheels is not None}
     tried: list[tuple[Fit, Law]] = []
     for kinds in (("white",), ("ar1", "slip"), ("slip-ar1",)) if noise_law == "auto" else ((noise_law,),):
-        for law in (NOISE_LAWS[name]._replace(coupling=coupling) for name in kinds):
+        for law in (NOISE_LAWS[name]._replace(**terms) for name in kinds):
             fit, beginning = fit_twice(beginning, runs, d_max, law, prior)
             tried.append((fit, law))
         fit, law = likeliest(tried, runs)
         if bool(fit.ok) and colour(fit, runs) < WHITE:
             break
-    both = NOISE_LAWS["slip-ar1"]._replace(coupling=coupling)
+    both = NOISE_LAWS["slip-ar1"]._replace(**terms)
     laws = [law] if noise_law != "auto" or law == both else [law, both]
     return settling_fit(beginning, runs, d_max, laws, fit) or (fit, law)
 
@@ -102,7 +104,7 @@ def coasts(fit: Fit, runs: Runs) -> np.ndarray:
 
 def likeliest(tried: list[tuple[Fit, Law]], runs: Runs) -> tuple[Fit, Law]:
     """The fit and law of the lowest criterion."""
-    return min(tried, key=lambda pair: criterion(pair[0], pair[1], 3 * int(np.sum(runs.seen))))
+    return min(tried, key=lambda pair: criterion(pair[0], pair[1], int(numbers_in(runs, pair[1]))))
 
 
 def colour(fit: Fit, runs: Runs) -> float:

@@ -4,9 +4,10 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jaxident.array_types import Increment, Pose, Wheels
-from jaxident.log import Log
+from jaxident.log import Log, first_rows
 from jaxident.robot.path_length import increment_between
 
 
@@ -65,3 +66,21 @@ def complete_observations(command: Wheels, increment: Increment) -> Observations
     """
     now, before = (Wheels(*(u[cut] for u in command)) for cut in (slice(1, -1), slice(0, -2)))
     return Observations(now, before, Increment(*(part[1:] for part in increment)), None, None, None, None)
+
+
+def repeats(log: Log) -> np.ndarray:
+    """Boolean (samples,): rows whose pose equals the one before in all three numbers."""
+    pose = np.stack([np.asarray(column) for column in log.pose])
+    same = np.concatenate([[False], np.all(pose[:, 1:] == pose[:, :-1], axis=0)])
+    return same & ~first_rows(log)
+
+
+def blind(log: Log, rows: Any) -> Log:
+    """The log without the poses of some rows, boolean (samples,)."""
+    x, y, theta = (np.where(rows, np.nan, column) for column in log.pose)
+    return log._replace(x=x, y=y, theta=theta)
+
+
+def poses_only(log: Log) -> Log:
+    """The log without wheel speeds."""
+    return log if log.wheel_r is None else log._replace(wheel_r=None, wheel_l=None)

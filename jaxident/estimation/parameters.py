@@ -7,36 +7,42 @@ import jax.numpy as jnp
 from jaxident.array_types import Array
 from jaxident.robot.drive import Physical
 from jaxident.robot.noise import Noise
+from jaxident.robot.wheel_sensor import WheelSensor
 
 
 class Law(NamedTuple):
-    """Which terms the model has: coupling of the two speeds, camera error with a memory (AR(1)), random slip."""
+    """Which terms the model has: coupling of the two speeds, camera error with a memory (AR(1)), random slip, and wheel
+    speeds as a second sensor."""
 
     coupling: bool = False
     memory: bool = False
     slip: bool = False
+    wheels: bool = False
 
 
 class Robot(NamedTuple):
-    """What a vector of unknowns stands for: drive, dead zones (2,) and noise law."""
+    """What a vector of unknowns stands for: drive, dead zones (2,), noise law, and the sensor of wheel speeds."""
 
     drive: Physical
     dead_zone: Any
     noise: Noise
+    wheels: Any = None
 
 
 NAMES = (
     "rate_1", "rate_2", "gain_11", "gain_12", "gain_21", "gain_22", "dead_zone_r", "dead_zone_l",
     "coupling_1", "coupling_2", "position", "heading", "correlation_time", "slip_along", "slip_heading",
+    "wheel_radius", "wheel_track", "wheel_noise",
 )  # fmt: skip
 """All unknowns in the order of the vector; a law keeps some of them."""
 
 _LOGARITHMIC = ("rate_1", "rate_2", *NAMES[10:])
 LOWEST = {"rate": 1e-4, "position": 1e-9, "heading": 1e-9, "correlation_time": 1e-4, "slip_along": 1e-7,
-           "slip_heading": 1e-7}  # fmt: skip
+           "slip_heading": 1e-7, "wheel_radius": 1e-5, "wheel_track": 1e-4, "wheel_noise": 1e-9}  # fmt: skip
 HIGHEST = {"rate": 1e3, "position": 1e3, "heading": 1e2, "correlation_time": 1e3, "slip_along": 1e3,
-            "slip_heading": 1e3}  # fmt: skip
-"""Between what a search may visit, by name or what is before its number: 1/s, m, rad, s, m/s^0.5, rad/s^0.5."""
+            "slip_heading": 1e3, "wheel_radius": 1e3, "wheel_track": 1e3, "wheel_noise": 1e5}  # fmt: skip
+"""Between what a search may visit, by name or what is before its number: 1/s, m, rad, s, m/s^0.5, rad/s^0.5,
+m, m, rad/s."""
 
 
 def names(law: Law) -> tuple[str, ...]:
@@ -45,6 +51,7 @@ def names(law: Law) -> tuple[str, ...]:
         (() if law.coupling else ("coupling_1", "coupling_2"))
         + (() if law.memory else ("correlation_time",))
         + (() if law.slip else ("slip_along", "slip_heading"))
+        + (() if law.wheels else ("wheel_radius", "wheel_track", "wheel_noise"))
     )
     return tuple(name for name in NAMES if name not in left_out)
 
@@ -59,11 +66,13 @@ def to_vector(robot: Robot, law: Law) -> Array:
     coupling = (0.0, 0.0) if robot.drive.coupling is None else robot.drive.coupling
     noise = robot.noise
     time = 1.0 if noise.correlation_time is None else noise.correlation_time
+    sensor = WheelSensor(1.0, 1.0, 1.0) if robot.wheels is None else robot.wheels
     values = [
         *jnp.log(jnp.asarray(robot.drive.rate)), *jnp.ravel(jnp.asarray(robot.drive.gain)),
         *jnp.asarray(robot.dead_zone), *jnp.asarray(coupling),
         *jnp.log(jnp.stack([jnp.asarray(v) for v in (noise.position, noise.heading, time)])),
         *jnp.log(jnp.maximum(jnp.stack([jnp.asarray(v) for v in (noise.slip_along, noise.slip_heading)]), 1e-300)),
+        *jnp.log(jnp.maximum(jnp.stack([jnp.asarray(v) for v in sensor]), 1e-300)),
     ]  # fmt: skip
     kept = names(law)
     low, high = bounds(law, jnp.inf)
@@ -86,7 +95,8 @@ def from_vector(vector: Array, law: Law) -> Robot:
         value.get("slip_along", 0.0),
         value.get("slip_heading", 0.0),
     )
-    return Robot(drive, (value["dead_zone_r"], value["dead_zone_l"]), noise)
+    sensor = WheelSensor(*(value[f"wheel_{name}"] for name in WheelSensor._fields)) if law.wheels else None
+    return Robot(drive, (value["dead_zone_r"], value["dead_zone_l"]), noise, sensor)
 
 
 def bounds(law: Law, d_max: Array) -> tuple[Array, Array]:

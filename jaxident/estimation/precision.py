@@ -8,11 +8,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxident.array_types import AT_REST, Array, Pose, State
+from jaxident.array_types import AT_REST, Array, State
 from jaxident.errors import InputError
 from jaxident.estimation.covariance import covariance_at
 from jaxident.estimation.parameters import Law, Robot, from_vector, names, to_vector
-from jaxident.estimation.runs import Runs, run_axes, stack_runs
+from jaxident.estimation.runs import Runs, run_axes, stack_runs, with_wheels
 from jaxident.estimation.scoring import Point, local_at
 from jaxident.estimation.verdict import Verdict, verdicts_of
 from jaxident.log import Log, join
@@ -22,6 +22,7 @@ from jaxident.robot.drive import Physical
 from jaxident.robot.model import DIFFERENCE_ORDER, Model, Spread, difference_vector, require_physical
 from jaxident.robot.noise import Noise
 from jaxident.robot.simulate import run_physical
+from jaxident.robot.wheel_sensor import WheelSensor, wheel_rates
 
 
 class Bound(NamedTuple):
@@ -46,18 +47,20 @@ def cramer_rao(model: Model, inputs: Log | Sequence[Log], noise: Noise, *, start
 
     The inverse of the Fisher information by automatic differentiation of the simulator, five start states per run and
     the noise law counted as unknowns. Rows without a pose count as not measured, unless no row has one. With slip the
-    information is that of the innovations along the path without it. InputError for a model without physical
-    parameters or a camera without noise. Needs double precision.
+    information is that of the innovations along the path without it. Wheel speeds count where the inputs have them, or
+    at all rows where their columns are empty throughout; the model then needs `wheels`. InputError for a model without
+    physical parameters, a camera or wheel speeds without noise. Needs double precision.
     """
     require_float64("cramer_rao")
     drive = require_physical(model)
     if not (float(noise.position) > 0.0 and float(noise.heading) > 0.0):
         raise InputError("noise: position and heading must be above 0; without noise there is no bound")
-    law = law_of(drive, noise)
     log = Log(*(np.asarray(column) for column in join(inputs)))
     runs = stack_runs(log)
     runs = runs if runs.seen.any() else runs._replace(seen=stack_runs(log._replace(x=log.t, y=log.t, theta=log.t)).seen)
-    vector = to_vector(Robot(drive, model.dead_zone, noise), law)
+    runs = _with_planned_wheels(model, runs, log)
+    law = law_of(drive, noise, wheels=runs.wheels is not None)
+    vector = to_vector(Robot(drive, model.dead_zone, noise, model.wheels), law)
     covariance = bound_covariance(vector, jnp.stack([jnp.asarray(s, float) for s in start]), runs, law)
     difference = difference_covariance(vector, covariance, model.sample_period, law)
     largest = max(float(np.max(np.abs(u))) for u in runs.command)
@@ -69,9 +72,23 @@ def cramer_rao(model: Model, inputs: Log | Sequence[Log], noise: Noise, *, start
     )  # fmt: skip
 
 
-def law_of(drive: Physical, noise: Noise) -> Law:
-    """The terms that a robot has."""
+def _with_planned_wheels(model: Model, runs: Runs, log: Log) -> Runs:
+    """The runs with the wheel speeds of a log that has their columns; all rows count where no row has one."""
+    if log.wheel_r is None:
+        return runs
+    if model.wheels is None or not float(model.wheels.noise) > 0.0:
+        raise InputError(
+            "wheels: the inputs have wheel speeds, so the model needs wheels {radius, track, noise}, noise above 0; "
+            "without these columns the bound is that of the poses alone"
+        )
+    blank = not (np.isfinite(log.wheel_r).any() or np.isfinite(log.wheel_l).any())
+    return with_wheels(runs, log._replace(wheel_r=log.t, wheel_l=log.t) if blank else log)
+
+
+def law_of(drive: Physical, noise: Noise, wheels: bool = False) -> Law:
+    """The terms that a robot has, with wheel speeds or without."""
     return Law(
+        wheels=wheels,
         coupling=drive.coupling is not None,
         memory=noise.correlation_time is not None,
         slip=bool(noise.slip_along > 0.0 or noise.slip_heading > 0.0),
@@ -81,17 +98,20 @@ def law_of(drive: Physical, noise: Noise) -> Law:
 @partial(jax.jit, static_argnames="law")
 def bound_covariance(vector: Array, start: Array, runs: Runs, law: Law) -> Array:
     """Covariance (unknowns, unknowns) by the information of runs (runs, rows), all from one start state (5,): pure,
-    maps over trials. Their poses are not read."""
+    maps over trials. What they measured is not read."""
     robot = from_vector(vector, law)
     model = Model(0.0, robot.drive, robot.dead_zone)
 
     def path(run):
         step = run.step if jnp.ndim(run.step) == 0 else run.step[:-1]
-        return run_physical(model, run.command, step, State(*start)).pose
+        return run_physical(model, run.command, step, State(*start))
 
-    poses: Pose = jax.vmap(path, in_axes=(run_axes(runs),))(runs)
+    states: State = jax.vmap(path, in_axes=(run_axes(runs),))(runs)
     point = Point(vector, jnp.tile(start, (len(runs.seen), 1)))
-    return covariance_at(point, local_at(point, runs._replace(pose=poses), law), law)
+    exact = runs._replace(pose=states.pose)
+    if law.wheels:
+        exact = exact._replace(wheels=wheel_rates(robot.wheels, states.v, states.w))
+    return covariance_at(point, local_at(point, exact, law), law)
 
 
 def natural_values(robot: Robot, law: Law) -> Array:
@@ -102,6 +122,7 @@ def natural_values(robot: Robot, law: Law) -> Array:
     parts += [noise.position, noise.heading]
     parts += [noise.correlation_time] if law.memory else []
     parts += [noise.slip_along, noise.slip_heading] if law.slip else []
+    parts += [] if robot.wheels is None or not law.wheels else list(robot.wheels)
     return jnp.stack([jnp.asarray(part) for part in parts])
 
 
@@ -126,4 +147,5 @@ def spread_of(covariance: Array, difference: Array, law: Law) -> Spread:
         alpha=image[:2], delta=image[2:6].reshape(2, 2), epsilon=image[6:10].reshape(2, 2), dead_zone=image[10:],
         physical=Physical(values[:2], values[2:6].reshape(2, 2), values[8:10] if law.coupling else np.zeros(2)),
         noise=Noise(*(deviation.get(name) for name in Noise._fields)),
+        wheels=WheelSensor(*(deviation[f"wheel_{name}"] for name in WheelSensor._fields)) if law.wheels else None,
     )  # fmt: skip

@@ -5,7 +5,8 @@ All else is measured by the log's own speed S and largest command U: a toy is sl
 unit is the user's. S [m/s] is the larger of the speed along and the turn rate at HALF_TRACK; it covers both channels.
 The steady speed per command, gain over rate, is normal about SPEED S / U with that same deviation, its sign that of a
 differential drive: + + along and + - in heading. Dead zones are normal about DEAD_ZONE U, deviation DEAD_ZONE_SPREAD U.
-Coupling is zero with the deviation that makes one speed of size S change the other by S at the middle rate.
+Coupling is zero with the deviation that makes one speed of size S change the other by S at the middle rate. Radius and
+track of measured wheels are log-normal, absolute.
 
 The likelihood's search adds half the squared departures to -log p. They are a few units over the whole range, where
 the poses of an informative log speak in thousands.
@@ -31,6 +32,9 @@ one has a smaller gain in heading than the prior's middle, by less than the devi
 SIGNS = ((1.0, 1.0), (1.0, -1.0))
 """Of the gains of a differential drive."""
 DEAD_ZONE, DEAD_ZONE_SPREAD = 0.15, 0.3
+WHEEL, WHEEL_SPREAD = (0.1, 0.5), 1.0
+"""Middle of radius and track [m] of a robot that measures its wheels, and the deviation of their logarithms: 95 % have
+wheels of 1.4 to 70 cm, 7 cm to 3.5 m apart."""
 LAG_SHARE, LONGEST_LAG = 10, 25
 """Rows over which speeds are taken: a tenth of a run, 25 at most. Over one row the camera's error would rule."""
 FIRMLY = 1e4
@@ -104,14 +108,18 @@ def _steady_speeds(prior: Prior) -> Array:
 
 def departures(shared: Array, law: Law, prior: Prior) -> Array:
     """How far a vector (unknowns,) of shared unknowns departs from the prior, in its deviations, one after the other:
-    two rates, four steady speeds, two dead zones, and two couplings where the law has them."""
+    two rates, four steady speeds, two dead zones, and two couplings, radius and track where the law has them."""
     firmness = jnp.where(prior.held, FIRMLY, 1.0)
     rates = firmness * (shared[:2] - jnp.log(RATE)) / RATE_SPREAD
     steady = shared[2:6].reshape(2, 2) * jnp.exp(-shared[:2])[:, None]
     gains = (steady / _steady_speeds(prior) - 1.0).ravel()
     dead_zones = (shared[6:8] / prior.command - DEAD_ZONE) / DEAD_ZONE_SPREAD
     couplings = shared[8:10] / (RATE * jnp.array([HALF_TRACK, 1.0 / HALF_TRACK])) if law.coupling else jnp.zeros(0)
-    return prior.weight * jnp.concatenate([rates, gains, dead_zones, couplings])
+    parts = [rates, gains, dead_zones, couplings]
+    if law.wheels:
+        first = names(law).index("wheel_radius")
+        parts.append((shared[first : first + 2] - jnp.log(jnp.array(WHEEL))) / WHEEL_SPREAD)
+    return prior.weight * jnp.concatenate(parts)
 
 
 def prior_terms(shared: Array, law: Law, prior: Prior) -> tuple[Array, Array, Array]:
@@ -157,5 +165,6 @@ def _strike(whole: Array, held: Array) -> Array:
 
 def from_prior(share: Array, law: Law) -> tuple[str, ...]:
     """The names of the robot's parameters that come mostly from the prior."""
-    robot = [name for name in names(law) if name.split("_")[0] in ("rate", "gain", "dead", "coupling")]
-    return tuple(name for name, own in zip(robot, share, strict=False) if own > MOSTLY)
+    robot = ("rate", "gain", "dead", "coupling", "wheel")
+    shares = zip(names(law), share, strict=True)
+    return tuple(name for name, own in shares if own > MOSTLY and name.split("_")[0] in robot)

@@ -14,9 +14,10 @@ from jaxident.effects.discovered import Laws, laws_of
 from jaxident.effects.fast_input import RUN_UP
 from jaxident.estimation.camera_noise import noise_for
 from jaxident.estimation.filtered_state import Run, Stretch, filter_and_run
+from jaxident.estimation.observations import blind, repeats
 from jaxident.estimation.parameter_spread import directions
 from jaxident.estimation.stretches import AXES, Starts, cut_stretches, until_last_start
-from jaxident.log import Log, blind, repeats
+from jaxident.log import Log
 from jaxident.robot.model import Model
 from jaxident.robot.noise import Noise
 

@@ -17,17 +17,21 @@ class Runs(NamedTuple):
     """Commands and poses of runs, arrays (runs, rows), finite everywhere; a single run where the axis is dropped.
 
     step [s]: from each row to the next, or one number where all are equal. seen: whether a pose was measured there;
-    rows past the end of a shorter run have none.
+    rows past the end of a shorter run have none. wheels [rad/s], turning: wheel speeds and whether each was measured,
+    both `Wheels`; None for logs without.
     """
 
     step: Any
     command: Wheels
     pose: Pose
     seen: Any
+    wheels: Any = None
+    turning: Any = None
 
 
 def stack_runs(log: Log) -> Runs:
-    """The runs of a log (NumPy arrays) side by side; a command that is missing on a run's last row becomes 0."""
+    """The runs of a log (NumPy arrays) side by side, poses alone; a command that is missing on a run's last row becomes
+    0. `with_wheels` adds wheel speeds."""
     runs = log.runs()
     rows = max(len(run.t) for run in runs)
 
@@ -50,8 +54,23 @@ def stack_runs(log: Log) -> Runs:
     )
 
 
+def with_wheels(runs: Runs, log: Log) -> Runs:
+    """The runs of a log that has wheel speeds, beside the poses; 0 where none was measured."""
+    parts = log.runs()
+    shape = np.shape(runs.seen)
+    wheels, turning = (Wheels(np.zeros(shape, kind), np.zeros(shape, kind)) for kind in (float, bool))
+    for k, run in enumerate(parts):
+        for side, speed in enumerate((run.wheel_r, run.wheel_l)):
+            measured = np.isfinite(speed)
+            turning[side][k, : len(run.t)] = measured
+            wheels[side][k, : len(run.t)] = np.where(measured, speed, 0.0)
+    return runs._replace(wheels=wheels, turning=turning)
+
+
 def cut_windows(runs: Runs, rows: int) -> Runs:
-    """Every run cut into windows of some rows, each a run of its own: (runs, rows) -> (runs * windows, rows)."""
+    """Every run cut into windows of some rows, each a run of its own: (runs, rows) -> (runs * windows, rows); of poses
+    alone."""
+    runs = runs._replace(wheels=None, turning=None)
     length = runs.seen.shape[-1]
     short = -length % rows
 
@@ -68,7 +87,7 @@ def cut_windows(runs: Runs, rows: int) -> Runs:
 
 def run_axes(runs: Runs) -> Runs:
     """The axes along which `vmap` walks over runs: a common step is shared."""
-    return Runs(None if jnp.ndim(runs.step) == 0 else 0, 0, 0, 0)  # type: ignore[arg-type]
+    return Runs(None if jnp.ndim(runs.step) == 0 else 0, 0, 0, 0, 0, 0)  # type: ignore[arg-type]
 
 
 def row_times(run: Runs) -> Array:

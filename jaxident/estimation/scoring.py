@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array
-from jaxident.estimation.likelihood import innovations
+from jaxident.estimation.likelihood import deviation_steps, innovations
 from jaxident.estimation.parameters import Law, bounds, is_logarithmic, names
 from jaxident.estimation.prior import Prior, prior_terms
 from jaxident.estimation.runs import Runs, run_axes
@@ -75,7 +75,7 @@ class Search(NamedTuple):
 def local_at(point: Point, runs: Runs, law: Law) -> Local:
     """Value, gradient and expected curvature at a point, by forward-mode derivatives through the simulator."""
 
-    of_run = _general_local if law.memory or law.slip else _white_local
+    of_run = _general_local if law.memory or law.slip or law.wheels else _white_local
     cut = len(names(law))
     unknowns = jnp.concatenate([jnp.tile(point.shared, (len(point.starts), 1)), point.starts], axis=1)
     over = jax.vmap(lambda own, run: of_run(own, run, law), in_axes=(0, run_axes(runs)))
@@ -97,8 +97,7 @@ def _general_local(unknowns: Array, run: Runs, law: Law) -> tuple[Array, Array, 
         return found, found
 
     slopes, found = jax.jacfwd(both, has_aux=True)(unknowns)
-    dz, dlog = (part.reshape(-1, len(unknowns)) for part in slopes)
-    z, log_variance = found.normalised.ravel(), found.log_variance.ravel()
+    (dz, dlog), (z, log_variance) = slopes.flat(len(unknowns)), found.flat()
     error = dz + 0.5 * z[:, None] * dlog
     gradient = dz.T @ z + 0.5 * jnp.sum(dlog, axis=0)
     return 0.5 * jnp.sum(z**2 + log_variance), gradient, error.T @ error + 0.5 * dlog.T @ dlog
@@ -129,19 +128,14 @@ def _white_local(unknowns: Array, run: Runs, law: Law) -> tuple[Array, Array, Ar
 
 
 def rescale(point: Point, runs: Runs, law: Law) -> Point:
-    """The point with both camera deviations at their optimum for the rest, in closed form; without slip only."""
-    if law.slip:
+    """The point with the deviations of white errors at their optimum for the rest, in closed form."""
+    if law.slip and not law.wheels:
         return point
     found = jax.vmap(lambda start, run: innovations(point.shared, start, run, law), in_axes=(0, run_axes(runs)))(
         point.starts, runs
     )
-    squares = jnp.sum(found.normalised**2, axis=(0, 2))
-    count = jnp.maximum(jnp.sum(runs.seen), 1)
-    mean = jnp.stack([0.5 * (squares[0] + squares[1]), squares[2]]) / count
-    first = names(law).index("position")
-    moved = point.shared.at[first : first + 2].add(0.5 * jnp.log(jnp.maximum(mean, 1e-30)))
     low, high = bounds(law, jnp.inf)
-    return point._replace(shared=jnp.clip(moved, low, high))
+    return point._replace(shared=jnp.clip(point.shared + deviation_steps(found, runs, law), low, high))
 
 
 def eliminate(local: Local, damping: Damping, held: Array) -> tuple[Array, Array, Array]:

@@ -78,7 +78,7 @@ def at_bound(model: Model, d_max: float) -> dict[str, float]:
 def bound_doubts(bounds: dict[str, float]) -> tuple[str, ...]:
     """A line for each number at a bound (`at_bound`) that another bound would change. A dead zone of 0 and no noise
     stand at bounds of nature."""
-    none = {name: LOWEST[name] for name in ("position", "heading", "slip_along", "slip_heading")}
+    none = {name: LOWEST[name] for name in ("position", "heading", "slip_along", "slip_heading", "wheel_noise")}
     none |= dict.fromkeys(("dead_zone_r", "dead_zone_l"), 0.0)
     return tuple(
         f"{name} stands at {bound:g}, the bound of its search: with another bound it would be another number, and its "
@@ -115,7 +115,8 @@ def _values(model: Model) -> dict[str, float]:
         "dead_zone_l": np.asarray(model.dead_zone)[1],
     }
     noise = {} if model.noise is None else {k: v for k, v in model.noise._asdict().items() if v is not None}
-    return jax.tree.map(float, {**named, **noise})
+    wheels = {} if model.wheels is None else {f"wheel_{k}": v for k, v in model.wheels._asdict().items()}
+    return jax.tree.map(float, {**named, **noise, **wheels})
 
 
 def _reason(k: int, order: Sequence[str], correlation: np.ndarray) -> str:

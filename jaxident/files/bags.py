@@ -3,12 +3,10 @@
 Messages are read one by one and nothing but their numbers is kept, so that a bag may be larger than the memory.
 """
 
-import contextlib
 import os
-import pathlib
 import warnings
 from array import array
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,23 +14,11 @@ import numpy as np
 from jaxident.array_types import Pose, Wheels
 from jaxident.columns import QUATERNION, Columns, heading_of, make_columns, seconds
 from jaxident.errors import InputError
-from jaxident.files.bag_transforms import STATIC, check_clock, read_pose_of_frame
-from jaxident.files.messages import COMMANDS, POSES, TRANSFORMS, Choice, MessageReader
-from jaxident.files.streams import Commands, Poses, Speeds, merge
+from jaxident.files.bag_topics import Topic, choose_topic, open_bag, topics_of, transform_topics
+from jaxident.files.bag_transforms import check_clock, read_pose_of_frame
+from jaxident.files.messages import COMMANDS, POSES, WHEEL_SPEEDS, Choice, MessageReader
+from jaxident.files.streams import Commands, Poses, Speeds, WheelSpeeds, merge
 from jaxident.log import Log
-
-UNREADABLE = "is no bag that can be read"
-
-
-class Topic(NamedTuple):
-    """A topic of a bag: messages, their mean rate [1/s] (NaN below two), and what it could be: "commands", "poses" or
-    "" for a type that has no reader."""
-
-    name: str
-    type: str
-    messages: int
-    rate: float
-    suits: str
 
 
 class BagStream(NamedTuple):
@@ -43,38 +29,36 @@ class BagStream(NamedTuple):
     notes: tuple[str, ...]
 
 
-def list_topics(path: str | os.PathLike) -> list[Topic]:
-    """The topics of a bag, by name. InputError for what is no bag."""
-    with open_bag(path) as reader:
-        return _topics(reader)
-
-
 def read_bag(
     path: str | os.PathLike,
     command_topic: str | None = None,
     pose_topic: str | None = None,
     *,
+    wheels_topic: str | None = None,
     child_frame: str | None = None,
     frames: tuple[str, str] | None = None,
     wheel_order: tuple[str, str] | None = None,
+    wheel_joints: tuple[str, str] | None = None,
     bag_time: bool = False,
     columns: Mapping[str, str] | str | None = None,
     units: Mapping[str, str | float] | None = None,
     **settings: Any,
 ) -> Log:
-    """One log from two topics of a bag; `settings` (period, track, pose_offset, hold_timeout) go to `merge`.
+    """One log from two topics of a bag, or three; `settings` (period, track, pose_offset, hold_timeout) go to `merge`.
 
     A topic that is left out is the only one that looks right. child_frame: which transform of a tf topic is the robot.
     frames: a fixed frame and the robot's, between which the transforms of all tf topics are composed (`transforms`).
-    wheel_order: indices (Float64MultiArray) or joint names (JointState) of the right and the left wheel. bag_time: the
-    time of recording in place of the headers' stamps. columns, units: changes to the columns v,w or u_r,u_l and
-    x,y,theta as in `Log.from_dataframe`. InputError names what is wrong and what there is.
+    wheel_order: indices (Float64MultiArray) or joint names (JointState) of the right and the left wheel, for commands.
+    wheels_topic: measured wheel speeds, JointState; wheel_joints: names of its right and left joint. bag_time: the time
+    of recording in place of the headers' stamps. columns, units: changes to the columns v,w or u_r,u_l, x,y,theta and
+    wheel_r,wheel_l as in `Log.from_dataframe`. InputError names what is wrong and what there is.
     """
-    chosen, choice = make_columns(columns, units), Choice(child_frame, wheel_order, bag_time, frames)
+    chosen, choice = make_columns(columns, units), Choice(child_frame, wheel_order, bag_time, frames, wheel_joints)
     commands, poses, notes = read_bag_streams(path, command_topic, pose_topic, choice, chosen)
     for note in notes:
         warnings.warn(note, stacklevel=2)
-    return merge(commands, poses, **settings)
+    wheels = None if wheels_topic is None else read_bag_wheels(path, wheels_topic, choice, chosen)
+    return merge(commands, poses, wheels=wheels, **settings)
 
 
 def read_bag_streams(
@@ -86,21 +70,29 @@ def read_bag_streams(
 ) -> tuple[Commands, Poses, tuple[str, ...]]:
     """Commands and poses of a bag, and what is worth knowing of them, a line each; see `read_bag`."""
     with open_bag(path) as reader:
-        topics = _topics(reader)
-        first, first_note = _chosen(path, topics, command_topic, "commands")
+        topics = topics_of(reader)
+        first, first_note = choose_topic(path, topics, command_topic, "commands")
         command = _read_topic(path, reader, first, COMMANDS, choice._replace(child_frame=None))
         if choice.frames is None:
-            second, second_note = _chosen(path, topics, pose_topic, "poses")
+            second, second_note = choose_topic(path, topics, pose_topic, "poses")
             pose = _read_topic(path, reader, second, POSES, choice)
         else:
             second_note = ()
-            pose = BagStream(*read_pose_of_frame(path, reader, _of_transforms(path, topics, pose_topic), choice))
+            pose = BagStream(*read_pose_of_frame(path, reader, transform_topics(path, topics, pose_topic), choice))
     values = [_in_si(stream.columns, columns or {}) for stream in (command, pose)]
     kind = Speeds if "v" in values[0] else Wheels
     notes = (*first_note, *second_note, *command.notes, *pose.notes)
     seen = np.isfinite(np.stack(list(values[1].values()))).all(axis=0)
     measured = Pose(**{name: column[seen] for name, column in values[1].items()})
     return Commands(command.t, kind(*values[0].values())), Poses(pose.t[seen], measured), notes
+
+
+def read_bag_wheels(path: str | os.PathLike, topic: str, choice: Choice, columns: Columns | None = None) -> WheelSpeeds:
+    """The measured wheel speeds in a topic of a bag; see `read_bag`."""
+    with open_bag(path) as reader:
+        chosen, _ = choose_topic(path, topics_of(reader), topic, "wheel speeds")
+        found = _read_topic(path, reader, chosen, WHEEL_SPEEDS, choice._replace(child_frame=None))
+    return WheelSpeeds(found.t, Wheels(*_in_si(found.columns, columns or {}).values()))
 
 
 def _in_si(found: dict[str, np.ndarray], columns: Columns) -> dict[str, np.ndarray]:
@@ -110,73 +102,6 @@ def _in_si(found: dict[str, np.ndarray], columns: Columns) -> dict[str, np.ndarr
         if column.source not in found:
             raise InputError(f"columns: {name}={column.source}: the topic has the columns {', '.join(found)}")
     return found | {name: column.convert(found[column.source]) for name, column in taken.items()}
-
-
-@contextlib.contextmanager
-def open_bag(path: str | os.PathLike) -> Iterator[Any]:
-    """A reader of the bag; whatever goes wrong in it is one InputError that names the bag."""
-    try:
-        from rosbags.highlevel import AnyReader
-        from rosbags.typesys import Stores, get_typestore
-    except ImportError:
-        raise InputError("bags are read by rosbags, which is not installed: pip install 'jaxident[ros]'") from None
-    if not os.path.exists(path):
-        raise InputError(f"{path}: no such file or folder")
-    try:
-        with AnyReader([pathlib.Path(path)], default_typestore=get_typestore(Stores.LATEST)) as reader:
-            yield reader
-    except (InputError, GeneratorExit):
-        raise
-    except Exception as error:  # a damaged bag fails in the reader, in YAML, in SQLite, in a decompressor ...
-        told = " ".join(str(error).split()) or type(error).__name__
-        raise InputError(
-            f"{path}: {UNREADABLE} ({told[:200]}); record or copy it again, or try `ros2 bag reindex`"
-        ) from error
-
-
-def _topics(reader: Any) -> list[Topic]:
-    spans = [(max(one.end_time - one.start_time, 0)) / 1e9 for one in reader.readers if one.message_count]
-    length = max(spans, default=0.0)
-    found = []
-    for name, info in sorted(reader.topics.items()):
-        kind = info.msgtype or "several types"
-        suits = "commands" if kind in COMMANDS else "poses" if kind in POSES else ""
-        rate = (info.msgcount - 1) / length if info.msgcount > 1 and length > 0.0 else np.nan
-        found.append(Topic(name, kind, info.msgcount, rate, suits))
-    return found
-
-
-def _chosen(path: Any, topics: list[Topic], wanted: str | None, what: str) -> tuple[Topic, tuple[str, ...]]:
-    """The topic of that name, or the only one with messages that looks right, which is then told."""
-    there = ", ".join(f"{topic.name} ({topic.type})" for topic in topics) or "none at all"
-    if wanted is not None:
-        found = next((topic for topic in topics if topic.name == wanted), None)
-        if found is None:
-            raise InputError(f"{path}: no topic {wanted!r}; there are {there}")
-        readers = COMMANDS if what == "commands" else POSES
-        if found.type not in readers:
-            raise InputError(f"{path}: {wanted} has the type {found.type}, of which no {what} are read; "
-                             f"readable are {', '.join(readers)}")  # fmt: skip
-        if not found.messages:
-            raise InputError(f"{path}: {wanted} has no messages; topics are {there}")
-        return found, ()
-    fitting = [topic for topic in topics if topic.suits == what and topic.messages]
-    option = "--command-topic" if what == "commands" else "--pose-topic"
-    if len(fitting) != 1:
-        listed = ", ".join(topic.name for topic in fitting) or "none"
-        raise InputError(f"{path}: {option} is needed; topics that could be {what}: {listed}; there are {there}")
-    return fitting[0], (f"{option} {fitting[0].name}: the only one that could be {what}",)
-
-
-def _of_transforms(path: Any, topics: list[Topic], wanted: str | None) -> list[str]:
-    """Names of the topics that hold transforms: those that are wanted and the static ones; InputError for none."""
-    there = [topic.name for topic in topics if topic.type in TRANSFORMS and topic.messages]
-    chosen = [name for name in there if wanted in (None, name) or name.endswith(STATIC)]
-    if not there or (wanted is not None and wanted not in there):
-        listed = ", ".join(f"{topic.name} ({topic.type})" for topic in topics) or "none at all"
-        told = "no topic holds transforms" if wanted is None else f"{wanted} holds no transforms"
-        raise InputError(f"{path}: {told}; there are {listed}")
-    return chosen
 
 
 def _read_topic(

@@ -1,6 +1,7 @@
 """Logs on disk: CSV with the header t,u_r,u_l,x,y,theta and, for several runs in one file, an integer column run.
 
 Row k holds the time t_k [s], the command applied from t_k until t_{k+1} and the camera pose at t_k ([m], [m], [rad]).
+Two more columns, wheel_r and wheel_l, may hold what the robot measured of its wheel speeds at t_k [rad/s].
 """
 
 import os
@@ -10,7 +11,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from jaxident.columns import Columns, make_columns
+from jaxident.columns import WHEELS, Columns, check_both_wheels, make_columns
 from jaxident.errors import InputError
 from jaxident.files.atomic import writing_text
 from jaxident.files.source import Source, explained
@@ -32,8 +33,9 @@ def read_log(
     columns, units: where the file has other names and units, as in `Log.from_dataframe`. A quaternion in columns
     qx,qy,qz,qw may stand for theta; cells may be parted by semicolons or tabs; a time may be an ISO date (Unix time).
 
-    Empty pose cells are NaN. The command of the last row of a run may be empty: it is never applied and is read as
-    a repeat of the command before (0 in a run of a single row). Further columns are ignored with a UserWarning.
+    Empty cells of poses and wheel speeds are NaN. The command of the last row of a run may be empty: it is never
+    applied and is read as a repeat of the command before (0 in a run of a single row). Further columns are ignored with
+    a UserWarning.
     InputError in one line names the file, the line and what would be right.
     """
     return read_whole(path, make_columns(columns, units))
@@ -46,7 +48,8 @@ def read_whole(path: Source, columns: Columns | None = None) -> Log:
 
 def read_file(path: Source, columns: Columns | None = None) -> Log:
     """The log of one file; see `read_log`."""
-    table = read_table(path, [COLUMNS], optional=("run",), columns=columns)
+    table = read_table(path, [COLUMNS], optional=("run", *WHEELS), columns=columns)
+    check_both_wheels(table.name, table.columns)
     filled = {"run": np.zeros(len(table.line))} | table.columns
     return checked(Log(**filled), table.name, table.place)
 
@@ -82,16 +85,17 @@ def find_simulated(paths: Source | Sequence[Source]) -> list[str]:
 def write_log(log: Log, path: Source) -> None:
     """Write a log as CSV, gzipped if the name ends in .gz; the file appears whole or not at all.
 
-    Numbers are the shortest that read back as they are, NaN in a pose is an empty cell; the column run is there
-    only if there is more than one run. InputError for a log that `read_log` would refuse or a target that cannot
-    be written, WorkError if the disk is full.
+    Numbers are the shortest that read back as they are, NaN in a pose or a wheel speed is an empty cell; the column run
+    is there only if there is more than one run, those of the wheels only if the log has wheel speeds. InputError for a
+    log that `read_log` would refuse or a target that cannot be written, WorkError if the disk is full.
     """
     log = Log(*(np.asarray(column, float) for column in log))
     checked(log, os.fspath(path), lambda row: f"{os.fspath(path)}, row {row}")
     several = log.run[0] != log.run[-1]
-    columns = (*log,)[:-1] + ((log.run.astype(np.int64),) if several else ())
+    names = (*COLUMNS, *(() if log.wheel_r is None else WHEELS), *(("run",) if several else ()))
+    columns = [getattr(log, name) if name != "run" else log.run.astype(np.int64) for name in names]
     with writing_text(path) as stream:
-        stream.write(",".join((*COLUMNS, "run")[: len(columns)]) + "\n")
+        stream.write(",".join(names) + "\n")
         for start in range(0, len(log.t), ROWS_PER_BLOCK):
             cells = [repr(column[start : start + ROWS_PER_BLOCK].tolist())[1:-1].split(", ") for column in columns]
             block = "\n".join(map(",".join, zip(*cells, strict=True)))

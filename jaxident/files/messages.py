@@ -14,17 +14,19 @@ from jaxident.errors import InputError
 NO_COVARIANCE = (np.nan, np.nan, np.nan)
 POSE_COLUMNS = ("x", "y", "qx", "qy", "qz", "qw", "var_x", "var_y", "var_theta")
 SPEED_COLUMNS, WHEEL_COLUMNS = ("v", "w"), ("u_r", "u_l")
+MEASURED_COLUMNS = ("wheel_r", "wheel_l")
 
 
 class Choice(NamedTuple):
     """What a topic alone does not say: the child frame of a transform, index or joint name of the right and the left
-    wheel, whether the time of recording counts in place of the header's stamp, and the frames between which transforms
-    are composed, the robot's last."""
+    wheel among the commands, whether the time of recording counts in place of the header's stamp, the frames between
+    which transforms are composed, the robot's last, and the right and the left joint among measured wheel speeds."""
 
     child_frame: str | None = None
     wheel_order: tuple[str, str] | None = None
     bag_time: bool = False
     frames: tuple[str, str] | None = None
+    wheel_joints: tuple[str, str] | None = None
 
 
 class Reading(NamedTuple):
@@ -77,22 +79,31 @@ def _index(word: str) -> int:
 
 
 def read_joints(message: Any, choice: Choice) -> Iterator[Reading]:
-    """sensor_msgs/JointState: velocities of two joints, those that `wheel_order` names or that say right and left."""
+    """sensor_msgs/JointState as commands: velocities of two joints, named by `wheel_order` or saying right and left."""
+    yield _velocities(message, choice.wheel_order, "--wheel-order")
+
+
+def read_measured_joints(message: Any, choice: Choice) -> Iterator[Reading]:
+    """sensor_msgs/JointState as measured wheel speeds; joints as `wheel_joints` names them."""
+    yield _velocities(message, choice.wheel_joints, "--wheel-joints")
+
+
+def _velocities(message: Any, order: tuple[str, str] | None, option: str) -> Reading:
     joints = list(message.name)
-    order = choice.wheel_order or tuple(_only(side, joints) for side in ("right", "left"))
+    order = order or (_only("right", joints, option), _only("left", joints, option))
     for joint in order:
         if joint not in joints:
-            raise InputError(f"--wheel-order {','.join(order)}: no joint {joint!r}; there are {', '.join(joints)}")
+            raise InputError(f"{option} {','.join(order)}: no joint {joint!r}; there are {', '.join(joints)}")
     if len(message.velocity) != len(joints):
-        raise InputError(f"a JointState has {len(message.velocity)} velocities for {len(joints)} joints; commands are "
+        raise InputError(f"a JointState has {len(message.velocity)} velocities for {len(joints)} joints; wheels are "
                          "read from its velocities")  # fmt: skip
-    yield Reading(stamp_of(message), tuple(float(message.velocity[joints.index(joint)]) for joint in order))
+    return Reading(stamp_of(message), tuple(float(message.velocity[joints.index(joint)]) for joint in order))
 
 
-def _only(side: str, joints: list[str]) -> str:
+def _only(side: str, joints: list[str], option: str) -> str:
     found = [joint for joint in joints if side in joint.lower()]
     if len(found) != 1:
-        raise InputError(f"{len(found)} joints say {side!r} among {', '.join(joints)}: give --wheel-order RIGHT,LEFT")
+        raise InputError(f"{len(found)} joints say {side!r} among {', '.join(joints)}: give {option} RIGHT,LEFT")
     return found[0]
 
 
@@ -157,5 +168,7 @@ POSES = {
     "nav_msgs/msg/Odometry": MessageReader(POSE_COLUMNS, read_uncertain_pose),
 }
 """Readers of poses by message type."""
+WHEEL_SPEEDS = {"sensor_msgs/msg/JointState": MessageReader(MEASURED_COLUMNS, read_measured_joints)}
+"""Readers of measured wheel speeds by message type."""
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage", "geometry_msgs/msg/TransformStamped")
 """Types of messages that hold transforms."""

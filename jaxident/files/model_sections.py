@@ -16,6 +16,7 @@ from jaxident.files.schema import Shape, take_array, take_keys, take_list, take_
 from jaxident.robot.drive import Physical
 from jaxident.robot.model import Discovered, Effect, Spread
 from jaxident.robot.noise import Noise
+from jaxident.robot.wheel_sensor import WheelSensor
 
 SHAPES: dict[str, Shape] = {"alpha": (2,), "delta": (2, 2), "epsilon": (2, 2), "dead_zone": (2,)}
 PHYSICAL_SHAPES: dict[str, Shape] = {"rate": (2,), "gain": (2, 2), "coupling": (2,)}
@@ -62,6 +63,22 @@ def write_noise(noise: Noise) -> dict[str, Any]:
     """The noise law; white noise has the correlation time null. Keys that came later stand there where they matter."""
     kept = {key: value for key, value in noise._asdict().items() if value is not None or key == "correlation_time"}
     return {key: or_none(to_lists, value) for key, value in kept.items()}
+
+
+def read_wheels(value: Any, where: str) -> WheelSensor:
+    """The sensor of wheel speeds; a radius and a track above zero."""
+    found = take_keys(value, where, WheelSensor._fields[:2], WheelSensor._fields[2:])
+    given = {key: 0.0 if entry is None else entry for key, entry in found.items()}
+    sensor = WheelSensor(**{key: take_number(entry, f"{where}.{key}", least=0.0) for key, entry in given.items()})
+    for key in ("radius", "track"):
+        if getattr(sensor, key) == 0.0:
+            raise InputError(f"{where}.{key}: is 0; it should be a positive length in metres")
+    return sensor
+
+
+def write_wheels(sensor: WheelSensor) -> dict[str, Any]:
+    """Radius, track and noise."""
+    return {key: to_lists(value) for key, value in sensor._asdict().items()}
 
 
 def read_effects(value: Any, where: str, known: Collection[str]) -> tuple[Effect, ...]:
@@ -151,12 +168,13 @@ def write_discovered(law: Discovered) -> dict[str, Any]:
 
 def read_spread(value: Any, where: str) -> Spread:
     """Standard deviations in the shape of the parameters: None where a whole entry is null, NaN where a number is."""
-    found = take_keys(value, where, (), (*SHAPES, "physical", "noise"))
+    found = take_keys(value, where, (), (*SHAPES, "physical", "noise", "wheels"))
     arrays = _read_gapped({key: found[key] for key in SHAPES}, where, SHAPES)
     return Spread(
         **arrays,
         physical=or_none(_read_physical_spread, found["physical"], f"{where}.physical"),
         noise=or_none(_read_noise_spread, found["noise"], f"{where}.noise"),
+        wheels=or_none(_read_wheels_spread, found["wheels"], f"{where}.wheels"),
     )
 
 
@@ -170,6 +188,11 @@ def _read_noise_spread(value: Any, where: str) -> Noise:
     return Noise(**{key: or_none(_take_deviation, entry, f"{where}.{key}") for key, entry in found.items()})
 
 
+def _read_wheels_spread(value: Any, where: str) -> WheelSensor:
+    found = take_keys(value, where, (), WheelSensor._fields)
+    return WheelSensor(**{key: or_none(_take_deviation, entry, f"{where}.{key}") for key, entry in found.items()})
+
+
 def _read_gapped(values: dict[str, Any], where: str, shapes: dict[str, Shape]) -> dict[str, np.ndarray | None]:
     return {
         key: None if value is None else take_array(value, f"{where}.{key}", shapes[key], least=0.0, gaps=True)
@@ -181,7 +204,10 @@ def write_deviations(value: Any) -> Any:
     """Standard deviations by name and as lists, null for every number that is none or not finite."""
     if value is None:
         return None
-    if isinstance(value, Spread | Physical | Noise):
+    if isinstance(value, Spread):
+        kept = {key: entry for key, entry in value._asdict().items() if key != "wheels" or entry is not None}
+        return write_deviations(kept)
+    if isinstance(value, Physical | Noise | WheelSensor):
         return write_deviations(value._asdict())
     if isinstance(value, dict):
         return {name: write_deviations(entry) for name, entry in value.items()}

@@ -28,6 +28,7 @@ from jaxident.files.model_sections import (
     read_noise,
     read_physical,
     read_spread,
+    read_wheels,
     to_lists,
     write_covariance,
     write_deviations,
@@ -35,6 +36,7 @@ from jaxident.files.model_sections import (
     write_effect,
     write_noise,
     write_physical,
+    write_wheels,
 )
 from jaxident.files.schema import take_array, take_keys, take_number
 from jaxident.files.source import Source
@@ -50,7 +52,7 @@ IMAGE_TOLERANCE = 1e-6
 """Largest departure of alpha, delta, epsilon from the image of `physical`, relative to the largest entry of each."""
 
 _NEEDED = ("schema", "sample_period", *SHAPES, "physical")
-_FREE = ("noise", "effects", "discovered", "standard_deviation", "covariance", "provenance")
+_FREE = ("noise", "effects", "discovered", "standard_deviation", "covariance", "provenance", "wheels")
 _compiled_image = jax.jit(to_difference)
 
 
@@ -90,6 +92,7 @@ def model_to_dict(model: Model) -> dict[str, Any]:
         "noise": or_none(write_noise, model.noise),
         "effects": [write_effect(effect) for effect in model.effects],
         **({"discovered": [write_discovered(law) for law in model.discovered]} if model.discovered else {}),
+        **({} if model.wheels is None else {"wheels": write_wheels(model.wheels)}),
         "standard_deviation": write_deviations(model.standard_deviation),
         "covariance": or_none(write_covariance, model.covariance, model.parameter_order),
         "provenance": write_provenance(model.provenance),
@@ -130,6 +133,7 @@ def model_from_dict(content: Any, known_effects: Collection[str] = tuple(CATALOG
         parameter_order=order,
         provenance=or_none(read_provenance, found["provenance"], f"{name}: provenance") or Provenance(),
         discovered=or_none(read_discovered, found["discovered"], f"{name}: discovered") or (),
+        wheels=or_none(read_wheels, found["wheels"], f"{name}: wheels"),
     )
 
 

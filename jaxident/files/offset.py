@@ -4,6 +4,7 @@ import numpy as np
 
 from jaxident.errors import InputError
 from jaxident.estimation.clock_offset import Response, respond, streams_of, streams_of_log
+from jaxident.estimation.wheel_suspicions import wheel_offset
 from jaxident.files.streams import Commands, Poses, wheel_speeds
 from jaxident.log import Log
 
@@ -34,6 +35,16 @@ def estimate_offset(commands: Commands, poses: Poses, track: float | None = None
 def estimate_log_offset(log: Log) -> Response:
     """As `estimate_offset`, for the poses of a finished log: one offset for all of its runs."""
     return _checked(respond(streams_of_log(log)))
+
+
+def estimate_wheels_offset(log: Log) -> tuple[float, float]:
+    """The time [s] to add to the wheel speeds' of a log, and its standard error. InputError where there is none."""
+    found = None if log.wheel_r is None else wheel_offset(log)
+    if found is None:
+        raise InputError(
+            "wheels_offset: the motion does not answer the wheel speeds, so no offset can be found; give a number"
+        )
+    return found
 
 
 def _checked(found: Response | None, shift: float = 0.0) -> Response:

@@ -1,4 +1,5 @@
-"""Two streams to one log: commands and camera poses that were recorded apart, each with its own times on one clock."""
+"""Two streams to one log, or three: commands, camera poses and perhaps wheel speeds that were recorded apart, each with
+its own times on one clock."""
 
 import warnings
 from typing import Any, NamedTuple, TypeVar
@@ -7,20 +8,16 @@ import numpy as np
 
 from jaxident.array_types import Pose, Wheels
 from jaxident.columns import QUATERNION, Column, Columns
+from jaxident.columns import WHEELS as WHEEL_SPEEDS
 from jaxident.errors import InputError
+from jaxident.files.merged_rows import SAME_TIME, by_event, by_period
 from jaxident.files.source import Source
 from jaxident.files.table import Table, read_table
 from jaxident.log import Log, make_log
 from jaxident.rules import Rule, check_pose_rate, enforce, ordered_time, pose_rules
 
-ROUNDING = 1e-3
-"""Rounding of time stamps, in periods: a command that comes this much after a row is still the row's own."""
-SAME_TIME = 1e-6
-"""Times less than this [s] apart are one: adding an offset to decimal stamps moves them by a rounding error."""
 LONGEST_OFFSET = 1e12
 """Beyond this [s], 30,000 years, a double no longer tells tenths of a millisecond."""
-MOST_ROWS = 20_000_000
-"""Most rows of an even log; more than that is two clocks mistaken for one."""
 UNIX = 1e8
 """Times above this [s] count from 1970: as a robot's time of operation they would be three years."""
 OTHER_UNIT = 100.0
@@ -53,6 +50,13 @@ class Poses(NamedTuple):
     pose: Pose
 
 
+class WheelSpeeds(NamedTuple):
+    """Measured wheel speeds [rad/s] at times t (speeds,) [s], in order; NaN where one was not measured."""
+
+    t: Any
+    speed: Wheels
+
+
 def read_commands(path: Source, columns: Columns | None = None) -> Commands:
     """Commands from CSV with the header t,v,w or t,u_r,u_l; InputError names the line at fault.
 
@@ -83,6 +87,16 @@ def read_poses(path: Source, columns: Columns | None = None) -> Poses:
     return Poses(t[seen], Pose(*(column[seen] for column in pose)))
 
 
+def read_wheels(path: Source, columns: Columns | None = None) -> WheelSpeeds:
+    """Wheel speeds from CSV with the header t,wheel_r,wheel_l, rules as in `read_commands`; a cell may be empty."""
+    table = read_table(path, [("t", *WHEEL_SPEEDS)], columns=_own(columns, WHEEL_SPEEDS))
+    _check_times(table)
+    t, *speed = table.columns.values()
+    if np.isnan(speed).all():
+        raise InputError(f"{table.name}: no row has a wheel speed")
+    return WheelSpeeds(t, Wheels(*speed))
+
+
 def _own(columns: Columns | None, names: tuple[str, ...]) -> dict[str, Column]:
     """Those of the columns that a stream has."""
     return {name: column for name, column in (columns or {}).items() if name in ("t", *names)}
@@ -92,6 +106,7 @@ def merge(
     commands: Commands,
     poses: Poses,
     *,
+    wheels: WheelSpeeds | None = None,
     period: float | None = None,
     track: float | None = None,
     pose_offset: float = 0.0,
@@ -103,56 +118,46 @@ def merge(
     to the times of the poses. A command holds until the next, with `hold_timeout` [s] that long at most, then zero.
 
     Without a period every event (command, expiry, pose) is a row; equal times share one, and a row without a pose
-    has NaN. Poses before the first command are left out: what the robot was told then is not known. With a
-    `period` [s] the rows are t_0 + k period from the first command on, each with the command in force and the
-    nearest pose within half a period or NaN; each pose is used once at most.
+    has NaN. Poses before the first command are left out: what the robot was told then is not known. With a `period` [s]
+    the rows are t_0 + k period from the first command on, each with the command in force and the nearest pose within
+    half a period or NaN; each pose is used once at most. Measured wheel speeds are laid on the rows as poses are; those
+    before the first command and after the end of commands and poses are left out.
 
-    Of several commands or poses at one time the last counts, with a UserWarning. InputError for a setting out of range,
-    speeds without a track, wheel commands with one, times that go back, streams that do not overlap or whose times
-    have other units.
+    Of several entries of a stream at one time the last counts, with a UserWarning. InputError for a setting out of
+    range, speeds without a track, wheel commands with one, times that go back, streams that do not overlap or whose
+    times have other units.
     """
     _check_settings(pose_offset, period=period, track=track, hold_timeout=hold_timeout)
-    command_t, wheels = _latest("commands", commands.t, wheel_speeds(commands.value, track))
+    command_t, value = _latest("commands", commands.t, wheel_speeds(commands.value, track))
     pose_t, pose = _latest("poses", np.asarray(poses.t) + pose_offset, poses.pose)
     check_pose_rate("poses", np.diff(pose_t))
     _check_overlap(command_t, pose_t)
     end = max(command_t[-1], pose_t[-1])
-    held_t, held = _expire(command_t, wheels, hold_timeout, end)
-    t, in_force, pose_row = _by_event(held_t, pose_t) if period is None else _by_period(held_t, pose_t, end, period)
+    held_t, held = _expire(command_t, value, hold_timeout, end)
+    sensors = [(pose_t, pose)] if wheels is None else [(pose_t, pose), _inside(wheels, held_t[0], end)]
+    times = [own for own, _ in sensors]
+    t, in_force, found = by_event(held_t, times) if period is None else by_period(held_t, times, end, period)
     if len(t) < 2:
         raise InputError(f"the streams make a log of a single row, at {t[0]:.10g} s; it needs two at least")
-    measured = (np.where(pose_row < 0, np.nan, column[pose_row]) for column in pose)
-    return make_log(t, *(command[in_force] for command in held), *measured)
+    log = make_log(t, *(command[in_force] for command in held), *_laid(pose, found[0]))
+    return Log(*log, *_laid(sensors[1][1], found[1])) if wheels else log
 
 
-def _by_event(held_t: np.ndarray, pose_t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Times of the rows, and per row the command in force and the pose (-1 for none) as indices."""
-    last = np.maximum(np.searchsorted(held_t, pose_t + SAME_TIME, side="right") - 1, 0)
-    pose_t = np.where(np.abs(pose_t - held_t[last]) <= SAME_TIME, held_t[last], pose_t)
-    t = np.union1d(held_t, pose_t[pose_t >= held_t[0]])
-    nearest = np.minimum(np.searchsorted(pose_t, t), len(pose_t) - 1)
-    return t, np.searchsorted(held_t, t, side="right") - 1, np.where(pose_t[nearest] == t, nearest, -1)
+def _laid(values: tuple, rows: np.ndarray) -> list[np.ndarray]:
+    """The columns of a sensor at the rows of a log, NaN where -1 says that it measured nothing."""
+    return [np.where(rows < 0, np.nan, column[rows]) for column in values]
 
 
-def _by_period(held_t: np.ndarray, pose_t: np.ndarray, end: float, period: float) -> tuple[np.ndarray, ...]:
-    """As `_by_event`, on the even grid; times are compared as counts of periods since the first row."""
-    with np.errstate(over="ignore"):  # infinitely many rows are too many too
-        rows = np.floor((end - held_t[0]) / period + ROUNDING) + 1
-    if rows > MOST_ROWS:
+def _inside(wheels: WheelSpeeds, begin: float, end: float) -> tuple[np.ndarray, Wheels]:
+    """Times and wheel speeds from the first command to the end; InputError where there are none."""
+    t, speed = _latest("wheel speeds", wheels.t, wheels.speed)
+    kept = (t >= begin - SAME_TIME) & (t <= end + SAME_TIME)
+    if not kept.any():
         raise InputError(
-            f"period: {period:g} s makes {rows:.3g} rows between {held_t[0]:.10g} s and {end:.10g} s; are both streams "
-            "on one clock?"
+            f"the wheel speeds run from {t[0]:.10g} to {t[-1]:.10g} s, commands and poses from {begin:.10g} to "
+            f"{end:.10g} s: they do not overlap; are all streams on one clock, in the same unit of time?"
         )
-    row = np.arange(int(rows))
-    in_force = np.searchsorted((held_t - held_t[0]) / period, row + ROUNDING, side="right") - 1
-    count = (pose_t - held_t[0]) / period
-    nearest = np.floor(count + 0.5)
-    order = np.lexsort((np.abs(count - nearest), nearest))  # by row, the nearest pose first
-    row_of_pose, first = np.unique(nearest[order], return_index=True)
-    inside = (row_of_pose >= 0) & (row_of_pose < rows)
-    pose_row = np.full(len(row), -1)
-    pose_row[row_of_pose[inside].astype(int)] = order[first[inside]]
-    return held_t[0] + period * row, in_force, pose_row
+    return t[kept], Wheels(*(column[kept] for column in speed))
 
 
 def wheel_speeds(value: Wheels | Speeds, track: float | None) -> Wheels:

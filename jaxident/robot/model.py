@@ -12,6 +12,7 @@ from jaxident.origin import Origin
 from jaxident.robot.difference import Difference, to_difference
 from jaxident.robot.drive import Physical
 from jaxident.robot.noise import Noise
+from jaxident.robot.wheel_sensor import WheelSensor
 
 DIFFERENCE_ORDER = (
     "alpha_1", "alpha_2",
@@ -49,6 +50,7 @@ class Spread(NamedTuple):
     dead_zone: Any = None
     physical: Physical | None = None
     noise: Noise | None = None
+    wheels: WheelSensor | None = None
 
 
 @jax.tree_util.register_dataclass
@@ -84,8 +86,8 @@ class Model:
     """A robot: dead zones, then a linear drive in one of two forms.
 
     `dynamics` is `Physical`, true at any sample period, or `Difference`, the paper's free numerators, true at
-    `sample_period` [s] only. alpha (2,), delta and epsilon (2, 2) are read from either. A pytree: numbers are
-    leaves, names are structure.
+    `sample_period` [s] only. alpha (2,), delta and epsilon (2, 2) are read from either. wheels: of a robot that
+    measures its wheel speeds. A pytree: numbers are leaves, names are structure.
     """
 
     sample_period: Any
@@ -98,6 +100,7 @@ class Model:
     parameter_order: tuple[str, ...] = dataclasses.field(default=(), metadata={"static": True})
     provenance: Provenance = dataclasses.field(default=Provenance(), metadata={"static": True})
     discovered: tuple[Discovered, ...] = ()
+    wheels: WheelSensor | None = None
 
     @property
     def physical(self) -> Physical | None:

@@ -23,7 +23,7 @@ def simulate(model: Model, log: Log, *, start: State = AT_REST, key: Array | Non
     Noise-free without a key; with one, slip and camera noise are drawn by the model's noise law. Steps may differ
     for a physical model; a model of free numerators refuses a log of another or an uneven period (InputError), and
     both refuse a log of several runs, each of which has a start of its own. Differentiable in the model and the
-    start. Needs double precision only for long runs.
+    start. Wheel speeds are none of its columns. Needs double precision only for long runs.
     """
     if model.effects:
         raise InputError(f"effect {model.effects[0].name!r}: this simulator runs nominal models only")
@@ -31,7 +31,7 @@ def simulate(model: Model, log: Log, *, start: State = AT_REST, key: Array | Non
     if not isinstance(model.dynamics, Physical):
         check_period(model, log)
     pose = _poses(model, log.t, log.command, start, None if model.noise is None else key)
-    return log._replace(x=pose.x, y=pose.y, theta=pose.theta)
+    return log._replace(x=pose.x, y=pose.y, theta=pose.theta, wheel_r=None, wheel_l=None)
 
 
 @jax.jit

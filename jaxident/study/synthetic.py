@@ -19,8 +19,11 @@ def excite(key: Array, name: str, samples: int, period: float, *, amplitude: flo
     return make_log(period * np.arange(samples), np.asarray(command.right), np.asarray(command.left))
 
 
-def simulate_runs(model: Model, log: Log, *, noise: tuple[float, float] | None = None, key: Array) -> Log:
-    """The log with every run's poses replaced by the model's, from rest at the origin.
+def simulate_runs(
+    model: Model, log: Log, *, noise: tuple[float, float] | None = None, wheel_noise: float = 0.0, key: Array
+) -> Log:
+    """The log with every run's poses replaced by the model's, from rest at the origin; its wheel speeds too, if the
+    model measures them, with white `wheel_noise` [rad/s].
 
     noise (position [m], heading [rad]) adds camera noise of that size, with the correlation time and the random slip
     of the model's own noise law; without it the poses are exact but for the model's random effects. Effects that
@@ -31,7 +34,9 @@ def simulate_runs(model: Model, log: Log, *, noise: tuple[float, float] | None =
         model = dataclasses.replace(model, noise=law._replace(position=noise[0], heading=noise[1]))
     else:
         model = dataclasses.replace(model, noise=None)
-    parts, draws = log.runs(), noise is not None or is_random(model)
+    if model.wheels is not None:
+        model = dataclasses.replace(model, wheels=model.wheels._replace(noise=wheel_noise))
+    parts, draws = log.runs(), noise is not None or wheel_noise > 0.0 or is_random(model)
     ends = np.cumsum([run.t[-1] - run.t[0] for run in parts])
     runs = [
         simulate(model, run, key=k if draws else None, session_time=begin)

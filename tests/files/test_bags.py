@@ -10,7 +10,8 @@ from support.bags import BEGIN, FORMATS, MCAP, ROS_1, SQLITE, Bag, name_of
 import jaxident as ji
 from jaxident.columns import parse_columns
 from jaxident.errors import InputError
-from jaxident.files.bags import list_topics, read_bag, read_bag_streams
+from jaxident.files.bag_topics import list_topics
+from jaxident.files.bags import read_bag, read_bag_streams, read_bag_wheels
 from jaxident.files.logs import read_log, write_log
 from jaxident.files.messages import Choice
 from jaxident.files.streams import merge, read_commands, read_poses
@@ -141,6 +142,26 @@ def test_every_command_type_gives_the_same_commands(tmp_path, form, command):
     assert any("has no stamps: its times are those at which the bag recorded it" in note for note in notes) == (
         command != "JointState"
     )
+
+
+def test_measured_wheel_speeds_are_a_third_topic(tmp_path):
+    path = name_of(tmp_path, MCAP)
+    with Bag(path, MCAP) as bag:
+        add_commands(bag, "TwistStamped")
+        add_poses(bag, "PoseStamped")
+        for stamp, v, w in zip(COMMAND_AT, V, W, strict=True):
+            message = bag.make("sensor_msgs/JointState", bag.header(stamp), ["fl", "fr"], np.zeros(2),
+                               np.array([w, v]), np.zeros(0))  # fmt: skip
+            bag.add("/joint_states", stamp + LATE, message)
+    found = read_bag_wheels(path, "/joint_states", Choice(wheel_joints=("fr", "fl")))
+    np.testing.assert_array_equal(found.speed, [V, W])
+    np.testing.assert_array_equal(found.t, [float(text) for text in seconds(COMMAND_AT)])
+    log = quietly(path, "/cmd", "/pose", wheels_topic="/joint_states", wheel_joints=("fr", "fl"), track=0.3)
+    np.testing.assert_array_equal(log.wheel_r[np.isfinite(log.wheel_r)], V)
+    with pytest.raises(InputError, match="0 joints say 'right' among fl, fr: give --wheel-joints RIGHT,LEFT"):
+        read_bag_wheels(path, "/joint_states", Choice())
+    with pytest.raises(InputError, match="of which no wheel speeds are read"):
+        read_bag_wheels(path, "/cmd", Choice())
 
 
 def test_times_of_recording_if_asked_for(tmp_path):

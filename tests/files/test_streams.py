@@ -9,7 +9,8 @@ import pytest
 from jaxident.array_types import Pose, Wheels
 from jaxident.errors import InputError
 from jaxident.files.logs import read_log, write_log
-from jaxident.files.streams import ROUNDING, Commands, Poses, Speeds, merge, read_commands, read_poses
+from jaxident.files.merged_rows import ROUNDING
+from jaxident.files.streams import Commands, Poses, Speeds, merge, read_commands, read_poses
 from jaxident.log import Log
 
 NAN = math.nan

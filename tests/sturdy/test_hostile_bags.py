@@ -14,7 +14,8 @@ import pytest
 from support.bags import BEGIN, FORMATS, Bag, name_of
 
 from jaxident.errors import InputError, WorkError
-from jaxident.files.bags import list_topics, read_bag_streams
+from jaxident.files.bag_topics import list_topics
+from jaxident.files.bags import read_bag_streams
 from jaxident.files.messages import Choice
 
 pytest.importorskip("rosbags", reason="rosbags is not installed (extra ros)")

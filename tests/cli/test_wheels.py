@@ -1,0 +1,87 @@
+"""Wheel speeds through the commands: made, converted, mended, refused."""
+
+import json
+
+import numpy as np
+import pytest
+from support.in_process import jaxident
+
+import jaxident as ji
+from jaxident.robot.drive import Physical
+from jaxident.robot.wheel_sensor import WheelSensor
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A folder with a model, and a log of it with wheel speeds."""
+    place = tmp_path_factory.mktemp("wheels")
+    drive = Physical(np.array([3.0, 5.0]), np.array([[0.5, 0.5], [5.0, -5.0]]))
+    ji.save_model(ji.Model(0.05, drive, np.zeros(2)), place / "model.json")
+    words = "simulate model.json --excitation multilevel --samples 400 --noise 0.001,0.005 --wheel-noise 0.05"
+    ended = jaxident(*words.split(), "--wheel-radius", "0.08", "--out", "log.csv", cwd=place)
+    assert ended.code == 0, ended.err
+    assert jaxident(*words.split()[:6], "--out", "plain.csv", cwd=place).code == 0
+    return place
+
+
+def test_wheel_speeds_are_simulated_with_the_track_of_the_gains(folder):
+    """Steady speeds per command are 1/6 m/s and 1 rad/s: the wheels stand 1/3 m apart."""
+    log = ji.read_log(folder / "log.csv")
+    exact = ji.load_model(folder / "model.json")
+    sensor = WheelSensor(0.08, 1.0 / 3.0, 0.0)
+    true = ji.simulate(ji.Model(0.05, exact.dynamics, exact.dead_zone, wheels=sensor), log)
+    assert np.std(log.wheel_r - true.wheel_r) == pytest.approx(0.05, rel=0.15)
+    assert np.std(log.wheel_l - true.wheel_l) == pytest.approx(0.05, rel=0.15)
+    again = "simulate", "model.json", "--inputs", "log.csv", "--out", "plain.csv"
+    ended = jaxident(*again, "--wheel-noise", "0", cwd=folder)
+    assert ended.code == 2
+    assert "wheel speeds need --wheel-radius R" in ended.err
+    assert ji.read_log(folder / "plain.csv").wheel_r is None
+
+
+def test_three_streams_become_a_log_and_a_late_one_is_mended(folder):
+    log = ji.read_log(folder / "log.csv")
+    for name, columns in (("cmd", ("u_r", "u_l")), ("pose", ("x", "y", "theta")), ("wheel", ("wheel_r", "wheel_l"))):
+        late = 0.2 if name == "wheel" else 0.0
+        frame = log.to_dataframe()[["t", *columns]]
+        frame.assign(t=frame.t + late).to_csv(folder / f"{name}.csv", index=False)
+    streams = ("--commands", "cmd.csv", "--poses", "pose.csv", "--wheels", "wheel.csv", "--wheels-columns")
+    ended = jaxident("convert", *streams, "wheel_r=wheel_r:rad/s", "--wheels-offset", "-0.2", "--period", "0.05",
+                     "--out", "made.csv", cwd=folder)  # fmt: skip
+    assert ended.code == 0, ended.err
+    assert "400 with a pose, 39" in ended.out
+    made = ji.read_log(folder / "made.csv")
+    both = np.isfinite(made.wheel_r)
+    np.testing.assert_allclose(made.wheel_r[both], log.wheel_r[both], rtol=1e-12)
+    assert jaxident("convert", *streams, "wheel_r=wheel_r", "--out", "late.csv", cwd=folder).code == 0
+    ended = jaxident("convert", "--log", "late.csv", "--wheels-offset", "auto", "--out", "mended.csv", cwd=folder)
+    assert ended.code == 0, ended.err
+    assert float(ended.out.split("--wheels-offset ")[1].split()[0]) == pytest.approx(-0.2, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (("--wheels", "wheel.csv", "--bag", "x.mcap"), "--wheels CSV goes with --commands and --poses"),
+        (("--wheels-topic", "/j", "--commands", "cmd.csv", "--poses", "pose.csv"), "are for --bag PATH"),
+        (("--log", "log.csv", "--wheels", "wheel.csv"), "--wheels is for two streams"),
+        (("--log", "plain.csv", "--wheels-offset", "0.1"), "the log has no wheel speeds"),
+    ],
+)
+def test_wrong_use_is_one_line(folder, words, line):
+    ended = jaxident("convert", *words, "--out", "no.csv", cwd=folder)
+    assert ended.code == 2
+    assert line in ended.err.replace("\n", " ")
+    assert not (folder / "no.csv").exists()
+
+
+def test_the_wheels_of_a_model_file_are_checked(folder):
+    content = json.loads((folder / "model.json").read_text())
+    assert "wheels" not in content
+    for wheels, line in (({"radius": 0.0, "track": 0.3}, "wheels.radius: is 0"), ({"radius": 0.1}, "no key 'track'"),
+                         ({"radius": 0.1, "track": 0.3, "gear": 2}, "unknown key 'gear'")):  # fmt: skip
+        (folder / "bad.json").write_text(json.dumps(content | {"wheels": wheels}))
+        with pytest.raises(ji.InputError, match=line):
+            ji.load_model(folder / "bad.json")
+    (folder / "good.json").write_text(json.dumps(content | {"wheels": {"radius": 0.1, "track": 0.3, "noise": None}}))
+    assert ji.load_model(folder / "good.json").wheels == WheelSensor(0.1, 0.3, 0.0)
