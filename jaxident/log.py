@@ -27,6 +27,14 @@ class Log(NamedTuple):
     t [s] rises strictly within a run; u_r, u_l in the user's unit; x, y [m], theta [rad], NaN where the camera saw
     nothing; run numbers the runs. A named tuple of arrays: it passes through `jit` and `vmap` as it is, and unpacks
     into its columns. A slice, a mask or an array of rows picks rows: `log[:10]` is a log of ten.
+
+    Examples:
+        >>> import jaxident as ji
+        >>> log = ji.Log.from_arrays([0.0, 0.1, 0.2], [1, 1, 1], [1, 1, 1], [0, 0.02, 0.04], [0] * 3, [0] * 3)
+        >>> log
+        Log of 3 rows in 1 run(s), 0.2 s, 100 % with a pose
+        >>> log[:2].x
+        array([0.  , 0.02])
     """
 
     t: Any
@@ -107,7 +115,13 @@ class Log(NamedTuple):
 
 
 def make_log(t, u_r, u_l, x=None, y=None, theta=None, run=None) -> Log:
-    """A log from arrays (samples,); columns left out are a camera that saw nothing, and a single run."""
+    """A log from arrays (samples,); columns left out are a camera that saw nothing, and a single run.
+
+    Examples:
+        >>> import jaxident as ji
+        >>> ji.make_log([0.0, 0.1], [1.0, 1.0], [0.5, 0.5]).x
+        array([nan, nan])
+    """
     blind = np.full(np.shape(t), np.nan)
     x, y, theta = (blind if column is None else column for column in (x, y, theta))
     return Log(t, u_r, u_l, x, y, theta, np.zeros(np.shape(t), int) if run is None else run)

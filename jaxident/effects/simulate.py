@@ -24,6 +24,14 @@ def simulate(
     act. session_time [s]: at the first row, for effects that drift. Steps may differ for a physical model; a model
     of free numerators takes no effects and refuses a log of another or an uneven period. InputError for these, for a
     log of several runs, and for effects that `check_effects` refuses. Differentiable in the model and the start.
+
+    Examples:
+        >>> import jax, jaxident as ji
+        >>> ji.start_jax()
+        >>> robot = ji.load_model("published")
+        >>> log = ji.simulate(robot, ji.excite(jax.random.key(0), "multilevel", 300, robot.sample_period))
+        >>> log.x.shape
+        (300,)
     """
     if not (model.effects or model.discovered):
         return nominal.simulate(model, log, start=start, key=key)

@@ -35,6 +35,12 @@ def read_log(
     Empty pose cells are NaN. The command of the last row of a run may be empty: it is never applied and is read as
     a repeat of the command before (0 in a run of a single row). Further columns are ignored with a UserWarning.
     InputError in one line names the file, the line and what would be right.
+
+    Examples:
+        >>> import jaxident as ji
+        >>> ji.write_log(ji.Log.from_arrays([0.0, 0.1], [1, 1], [1, 1], [0, 0.02], [0, 0], [0, 0]), "log.csv")
+        >>> ji.read_log("log.csv")
+        Log of 2 rows in 1 run(s), 0.1 s, 100 % with a pose
     """
     return read_whole(path, make_columns(columns, units))
 
@@ -85,6 +91,12 @@ def write_log(log: Log, path: Source) -> None:
     Numbers are the shortest that read back as they are, NaN in a pose is an empty cell; the column run is there
     only if there is more than one run. InputError for a log that `read_log` would refuse or a target that cannot
     be written, WorkError if the disk is full.
+
+    Examples:
+        >>> import jaxident as ji
+        >>> ji.write_log(ji.make_log([0.0, 0.1], [1.0, 1.0], [0.5, 0.5]), "commands.csv")
+        >>> ji.read_log("commands.csv")
+        Log of 2 rows in 1 run(s), 0.1 s, 0 % with a pose
     """
     log = Log(*(np.asarray(column, float) for column in log))
     checked(log, os.fspath(path), lambda row: f"{os.fspath(path)}, row {row}")
