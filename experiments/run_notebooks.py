@@ -17,6 +17,8 @@ from nbclient import NotebookClient
 
 FOLDER = pathlib.Path(__file__).resolve().parent / "notebooks"
 KEPT = ("image/png", "text/plain")
+WIDGET = "application/vnd.jupyter.widget-view+json"
+"""A slider, which nothing but a kernel moves."""
 PICTURE = "last.png"
 LONGEST = 1200.0
 """Seconds that one cell may take on a busy machine."""
@@ -36,13 +38,14 @@ def keep(book: nbformat.NotebookNode, path: pathlib.Path) -> None:
     pictures = []
     for cell in book.cells:
         cell.metadata = {}
+        if "outputs" in cell:
+            told = [one for one in cell.outputs if one.get("name") != "stderr"]
+            cell.outputs = [one for one in told if WIDGET not in one.get("data", {})]
         for output in cell.get("outputs", []):
             if "data" in output:
                 output["data"] = {kind: output["data"][kind] for kind in KEPT if kind in output["data"]}
                 output["metadata"] = {}
                 pictures += [output["data"]["image/png"]] if "image/png" in output["data"] else []
-        if "outputs" in cell:
-            cell.outputs = [one for one in cell.outputs if one.get("name") != "stderr"]
     if f"attachment:{PICTURE}" in book.cells[0].source:
         book.cells[0].attachments = {PICTURE: {"image/png": pictures[-1]}}
     book.metadata = {"kernelspec": book.metadata.kernelspec, "language_info": {"name": "python"}}

@@ -115,13 +115,7 @@ class Log(NamedTuple):
 
 
 def make_log(t, u_r, u_l, x=None, y=None, theta=None, run=None) -> Log:
-    """A log from arrays (samples,); columns left out are a camera that saw nothing, and a single run.
-
-    Examples:
-        >>> import jaxident as ji
-        >>> ji.make_log([0.0, 0.1], [1.0, 1.0], [0.5, 0.5]).x
-        array([nan, nan])
-    """
+    """A log from arrays (samples,); columns left out are a camera that saw nothing, and a single run."""
     blind = np.full(np.shape(t), np.nan)
     x, y, theta = (blind if column is None else column for column in (x, y, theta))
     return Log(t, u_r, u_l, x, y, theta, np.zeros(np.shape(t), int) if run is None else run)

@@ -37,7 +37,7 @@ def waterfall(
             ax.plot([end, end], [place, place + 1], color=style.GREY, linewidth=style.THIN)
         text = (notes or {}).get(name, "")
         ax.annotate(text, (max(end, begins[place], high), place), (5, 0), textcoords="offset points", va="center",
-                    fontsize=style.TEXT - 1)  # fmt: skip
+                    fontsize=style.TEXT - 1, bbox={"color": "white", "pad": 0.8})  # fmt: skip
     low, high = ax.get_xlim()
     ax.set_xlim(low, max(high, 100.0) * 1.33)
     ax.axvline(100.0, color=style.BLACK, linewidth=style.THIN, linestyle="--")
