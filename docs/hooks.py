@@ -15,6 +15,7 @@ sys.path.insert(0, str(ROOT))
 
 import jaxident  # noqa: E402 - both lie beside this folder
 from experiments import effect_cards, notebook_pages, reference_page  # noqa: E402
+from jaxident.report.glossary import TERMS  # noqa: E402
 
 COPIED = {
     "README.md": "index.md",
@@ -50,7 +51,9 @@ def on_files(files, config):
 def made_pages() -> dict[str, str | bytes]:
     """Content by place. Made once: `mkdocs serve` builds often."""
     jaxident.start_jax()
+    words = "\n".join(f"* **{term}**: {meaning}" for term, meaning in TERMS.items())
     pages: dict[str, str | bytes] = {"reference.md": reference_page.page(), **effect_cards.pages()}
+    pages["glossary.md"] = f"# Glossary\n\n{words}\n"
     for source, place in COPIED.items():
         path = ROOT / source
         pages[place] = with_links(path.read_text("utf-8")) if path.suffix == ".md" else path.read_bytes()
