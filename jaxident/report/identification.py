@@ -18,7 +18,7 @@ from jaxident.log import Log, join
 from jaxident.report.glossary import glossary
 from jaxident.report.origin import origin_section
 from jaxident.report.page import Figure, Page, Section, Table, write_page
-from jaxident.report.words import about
+from jaxident.report.words import SPACE, about
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -81,7 +81,8 @@ def with_words(row: Verdict) -> tuple[str, ...]:
     """A parameter as a row of a page's table, in the order of COLUMNS."""
     name, estimate, interval, verdict = row.cells()
     meaning, unit = about(name)
-    return name, meaning, estimate, interval, unit, verdict
+    told = f"{meaning} [{unit}]" if unit else meaning
+    return name, told, estimate, interval.replace(" ", SPACE), verdict
 
 
 def _doubts(found: Identification) -> list[str]:
@@ -143,7 +144,7 @@ def _pictures(found: Identification, log: Log, normalised: np.ndarray, seen: np.
 
 
 WORDS = ("dead zone", "determined", "interval", "prior", "residual", "root mean square", "slip", "white")
-COLUMNS = ("parameter", "what it is", "estimate", "95 % interval", "unit", "this input")
+COLUMNS = ("parameter", "what it is", "estimate", "95 % interval", "this input")
 ABOUT_INTERVALS = (
     "Intervals hold under the noise law whose numbers stand at the end. Determined: the half-width is below a tenth of "
     "the parameter (for a dead zone, of the largest command); weak: below a half. From the prior: more than half of "

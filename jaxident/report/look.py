@@ -43,7 +43,7 @@ footer { color: var(--soft); font-size: 0.85rem; margin-top: 3rem; padding-top: 
   table { font-size: 0.84rem; }
   th, td { padding-right: 0.55rem; }
   td { min-width: 0; }
-  .white img { max-width: none; width: 30rem; }
+  .white img:not(.fits) { max-width: none; width: 30rem; }
 }
 @media print {
   :root { --text: #000000; --soft: #404040; --back: #ffffff; --line: #b0b0b0; --shade: transparent; --mark: #000000; }

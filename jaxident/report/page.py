@@ -18,6 +18,9 @@ NOTHING = "–"
 SCALE = 0.72
 """Size on the page [px] of a dot of a picture: one of 6.3 inches at 150 dots an inch fills the column."""
 
+NARROW = 520
+"""Width on the page [px] up to which a picture's text stays readable where it is shrunk to a phone's 340."""
+
 # Even a page that went wrong loads nothing: the browser allows its own pictures and its own style alone.
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 
@@ -118,7 +121,10 @@ def _image(figure: Figure) -> str:
     """The picture in proportion to its size in dots, so that the text of all pictures is equally large."""
     width, height = (round(SCALE * size) for size in struct.unpack(">II", figure.png[16:24]))  # of the PNG header
     source = base64.b64encode(figure.png).decode("ascii")
-    return f'<img width="{width}" height="{height}" alt="{escape(figure.alt)}" src="data:image/png;base64,{source}">'
+    fits = ' class="fits"' if width <= NARROW else ""
+    return (
+        f'<img{fits} width="{width}" height="{height}" alt="{escape(figure.alt)}" src="data:image/png;base64,{source}">'
+    )
 
 
 def _table(table: Table) -> str:
