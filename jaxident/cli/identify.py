@@ -167,7 +167,7 @@ def _say(found, rows, method: str, again) -> None:
     from jaxident.estimation.bootstrap import describe, interval_cells
     from jaxident.report.words import about
 
-    lines = [("parameter", "estimate", "95 % interval", "unit", "this input")]
+    lines: list[tuple[str, ...]] = [("parameter", "estimate", "95 % interval", "unit", "this input")]
     lines += [(*cells[:3], about(cells[0])[1], cells[3]) for cells in (row.cells() for row in rows)]
     if again:
         beside = ["bootstrap", *interval_cells(again)]

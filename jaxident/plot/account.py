@@ -42,7 +42,7 @@ def waterfall(
         ax.annotate(text, (max(end, begins[place], high), place), (5, 0), textcoords="offset points", va="center",
                     fontsize=style.TEXT - 1, bbox={"color": "white", "pad": 0.8})  # fmt: skip
     low, high = ax.get_xlim()
-    wide = ax.get_position().width * ax.figure.get_figwidth()
+    wide = ax.bbox.width / ax.figure.dpi
     ax.set_xlim(low, max(high, 100.0) * wide / max(wide - NOTE, 0.5 * wide))
     ax.axvline(100.0, color=style.BLACK, linewidth=style.THIN, linestyle="--")
     ax.set_xticks([tick for tick in ax.get_xticks() if low <= tick <= 100.0])
