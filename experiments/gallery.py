@@ -69,9 +69,9 @@ def setup_time(seeds: int) -> Answer:
     ax.set(xlabel="setup time [s]", ylabel="error of the median parameter [%]", yscale="log")
     ji.plot.legend_above(ax)
     enough = [rows[int(np.argmax(column <= 1.2 * column.min()))] for column in error.T]
-    told = " and ".join(
-        f"{PERIOD * n:.1f} s at {1e3 * v:g} mm" for n, v in zip(enough, summary.noise.values, strict=True)
-    )
+    ends = {n: f"{PERIOD * n:.1f} s" + (", the longest that was tried," if n == rows[-1] else "") for n in rows}
+    pairs = zip(enough, 1e3 * summary.noise.values, strict=True)
+    told = " and ".join(f"{ends[n]} at {level:g} mm" for n, level in pairs)
     return Answer(f"Within a fifth of the least error: {told} of camera noise.", _done(figure, "Error by setup time"))
 
 
