@@ -38,6 +38,11 @@ class Log(_Columns):
 
     wheel_r, wheel_l: the robot's own wheel speeds [rad/s], NaN where it measured none. In a log without them both are
     None, and no columns of the tuple; a log with them is a `LogWithWheels`.
+
+    Examples:
+        >>> import jaxident as ji
+        >>> ji.Log.from_arrays([0.0, 0.1, 0.2], [1, 1, 1], [1, 1, 1], [0, 0.02, 0.04], [0] * 3, [0] * 3)
+        Log of 3 rows in 1 run(s), 0.2 s, 100 % with a pose
     """
 
     __slots__ = ()
@@ -47,16 +52,13 @@ class Log(_Columns):
         columns = t, u_r, u_l, x, y, theta, run
         if wheel_r is None and wheel_l is None:
             return tuple.__new__(Log, columns)
-        given = zip(WHEELS, (wheel_r, wheel_l), strict=True)
-        check_both_wheels("log", [name for name, column in given if column is not None])
+        check_both_wheels("log", [k for k, column in zip(WHEELS, (wheel_r, wheel_l), strict=True) if column is not None])
         return tuple.__new__(LogWithWheels, (*columns, wheel_r, wheel_l))
 
     @classmethod
     def from_arrays(cls, t, u_r, u_l, x=None, y=None, theta=None, run=None, wheel_r=None, wheel_l=None) -> "Log":
-        """A checked log, float64, from arrays (samples,); what is left out as in `make_log`.
-
-        The rules are those of a log file: InputError names the row that breaks one.
-        """
+        """A checked log, float64, from arrays (samples,); what is left out as in `make_log`. InputError names the row
+        that breaks a rule of log files."""
         return from_columns(make_log(t, u_r, u_l, x, y, theta, run, wheel_r, wheel_l)._asdict())
 
     @classmethod

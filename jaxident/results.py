@@ -23,9 +23,10 @@ from jaxident.files.predictions import write_prediction
 from jaxident.log import Log, join
 from jaxident.report.account import account_lines, account_section, draw_account
 from jaxident.report.diagnosis import diagnosis_page
-from jaxident.report.identification import COLUMNS, draw_fit, write_identification
+from jaxident.report.identification import COLUMNS, draw_fit, with_words, write_identification
 from jaxident.report.lead import lead
 from jaxident.report.page import Figure, Table, fragment, write_page
+from jaxident.report.words import about
 
 
 class Identification(identifying.Identification):
@@ -43,13 +44,14 @@ class Identification(identifying.Identification):
         return verdicts(self.model, max(float(np.max(np.abs(u))) for log in self.logs for u in log.command))
 
     def __repr__(self) -> str:
-        return "\n".join([_counted(self), *_aligned([row.cells() for row in self.verdicts]), *self.suspicions])
+        rows = [(name, *told[:2], about(name)[1], *told[2:]) for name, *told in (row.cells() for row in self.verdicts)]
+        return "\n".join([_counted(self), *_aligned(rows), *self.suspicions])
 
     def _repr_html_(self) -> str:
         figure, ax = plot.figure(size=(6.3, 4.6))
         self.plot(ax)
         picture = Figure(plot.image(figure), "measured and modelled path")
-        table = Table(COLUMNS, [row.cells() for row in self.verdicts])
+        table = Table(COLUMNS, [with_words(row) for row in self.verdicts])
         return fragment([_counted(self), picture, table, *self.suspicions])
 
     def to_dataframe(self) -> Any:

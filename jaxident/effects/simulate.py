@@ -29,6 +29,14 @@ def simulate(
 
     A model with `wheels` gives wheel speeds too, with their noise if there is a key. InputError for one of free
     numerators, and for an effect under which a wheel slides: how fast it turns then is not simulated.
+
+    Examples:
+        >>> import jax, jaxident as ji
+        >>> ji.start_jax()
+        >>> robot = ji.load_model("published")
+        >>> log = ji.simulate(robot, ji.excite(jax.random.key(0), "multilevel", 300, robot.sample_period))
+        >>> log.x.shape
+        (300,)
     """
     if model.wheels is not None:
         _check_wheels(model)

@@ -23,12 +23,12 @@ ROWS_PER_BLOCK = 1 << 16
 
 
 def read_log(
-    path: Source,
+    path: Source | Sequence[Source],
     columns: Mapping[str, str] | str | None = None,
     units: Mapping[str, str | float] | None = None,
 ) -> Log:
     """One log with all runs of a file, all arrays (rows,) float64, run int64; "-" is the standard input, a folder
-    stands for its logs (`find_logs`), one after the other.
+    stands for its logs (`find_logs`), one after the other, and so does a list of files and folders.
 
     columns, units: where the file has other names and units, as in `Log.from_dataframe`. A quaternion in columns
     qx,qy,qz,qw may stand for theta; cells may be parted by semicolons or tabs; a time may be an ISO date (Unix time).
@@ -37,13 +37,23 @@ def read_log(
     applied and is read as a repeat of the command before (0 in a run of a single row). Further columns are ignored with
     a UserWarning.
     InputError in one line names the file, the line and what would be right.
+
+    Examples:
+        >>> import jaxident as ji
+        >>> ji.write_log(ji.Log.from_arrays([0.0, 0.1], [1, 1], [1, 1], [0, 0.02], [0, 0], [0, 0]), "log.csv")
+        >>> ji.read_log("log.csv")
+        Log of 2 rows in 1 run(s), 0.1 s, 100 % with a pose
     """
     return read_whole(path, make_columns(columns, units))
 
 
-def read_whole(path: Source, columns: Columns | None = None) -> Log:
-    """A file or a folder as one log; see `read_log`."""
-    return join(read_logs(path, columns)) if os.path.isdir(path) else read_file(path, columns)
+def read_whole(path: Source | Sequence[Source], columns: Columns | None = None) -> Log:
+    """A file, a folder or a list of them as one log; see `read_log`."""
+    if isinstance(path, str | os.PathLike) and not os.path.isdir(path):
+        return read_file(path, columns)
+    if not (logs := read_logs(path, columns)):
+        raise InputError("no log in an empty list; it takes a path, a folder, or a list of these")
+    return join(logs)
 
 
 def read_file(path: Source, columns: Columns | None = None) -> Log:
@@ -88,6 +98,12 @@ def write_log(log: Log, path: Source) -> None:
     Numbers are the shortest that read back as they are, NaN in a pose or a wheel speed is an empty cell; the column run
     is there only if there is more than one run, those of the wheels only if the log has wheel speeds. InputError for a
     log that `read_log` would refuse or a target that cannot be written, WorkError if the disk is full.
+
+    Examples:
+        >>> import jaxident as ji
+        >>> ji.write_log(ji.make_log([0.0, 0.1], [1.0, 1.0], [0.5, 0.5]), "commands.csv")
+        >>> ji.read_log("commands.csv")
+        Log of 2 rows in 1 run(s), 0.1 s, 0 % with a pose
     """
     log = Log(*(np.asarray(column, float) for column in log))
     checked(log, os.fspath(path), lambda row: f"{os.fspath(path)}, row {row}")

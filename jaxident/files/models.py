@@ -61,6 +61,11 @@ def load_model(path: Source, known_effects: Collection[str] = tuple(CATALOGUE)) 
 
     `known_effects` are the names that the file's effects may have, those of the catalogue unless told otherwise.
     InputError names the file and the key at fault.
+
+    Examples:
+        >>> import jaxident as ji
+        >>> ji.load_model("published").physical.rate.round(2)
+        array([0.54, 7.82])
     """
     name = os.fspath(path)
     if os.path.exists(path):
@@ -72,7 +77,14 @@ def load_model(path: Source, known_effects: Collection[str] = tuple(CATALOGUE)) 
 
 
 def save_model(model: Model, path: Target) -> None:
-    """Write a model file, whole or not at all; it reads back exactly. InputError for a model that would not load."""
+    """Write a model file, whole or not at all; it reads back exactly. InputError for a model that would not load.
+
+    Examples:
+        >>> import jaxident as ji
+        >>> ji.save_model(ji.load_model("published"), "robot.json")
+        >>> ji.load_model("robot.json").dead_zone
+        array([0.25, 0.2 ])
+    """
     write_text(path, format_json(model_to_dict(model)))
 
 

@@ -68,6 +68,14 @@ def study(
     content: a `Study` (whose own seed counts), the content of a study file as a dict, or a file's path. Without `out`
     in memory; with it in a folder, as `jaxident sweep` does, and the trials are read when they are used.
     `jaxident.summarise` makes statistics of the result. InputError names the key at fault. Needs double precision.
+
+    Examples:
+        >>> import jaxident as ji
+        >>> ji.start_jax()
+        >>> content = {"seeds": 8, "noise": [1e-5], "robots": [{"model": "published"}], "estimators": ["batch"]}
+        >>> trials = ji.study(content)
+        >>> trials.sizes["seed"]
+        8
     """
     if isinstance(content, str | os.PathLike):
         content = read_study(content, seed=seed)

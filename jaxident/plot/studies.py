@@ -107,16 +107,18 @@ def error_histogram(
 ) -> Axes:
     """Distribution of the error of one parameter, {estimator: (trials,)} in SI units with NaN for failures.
 
-    bound: smallest standard deviation possible, drawn as the normal density of that width around zero.
+    bound: smallest standard deviation possible, drawn as the normal density of that width around zero. Where it is far
+    narrower than the errors, its top is cut off: the histograms set the height.
     """
     ax = style.axes_or_new(ax, (style.WIDTH, 2.8))
     how = written(label)
     kept = {name: how.scale * np.asarray(v, float)[np.isfinite(v)] for name, v in errors.items()}
     edges = _edges([v for v in kept.values() if v.size])
-    low, high = edges[0], edges[-1]
+    low, high, top = edges[0], edges[-1], 0.0
     for number, (name, values) in enumerate(kept.items()):
         if values.size:
             heights = np.histogram(np.clip(values, low, high), edges)[0] / (values.size * (edges[1] - edges[0]))
+            top = max(top, float(heights.max()))
             colour = style.SERIES[number % len(style.SERIES)][0]
             ax.stairs(heights, edges, color=colour, fill=True, alpha=0.25)
             ax.stairs(heights, edges, color=colour, linewidth=style.LINE, label=name)
@@ -126,7 +128,7 @@ def error_histogram(
         x = np.linspace(low, high, 400)
         density = np.exp(-0.5 * (x / spread) ** 2) / (spread * np.sqrt(2.0 * np.pi))
         ax.plot(x, density, color=style.TRUE, linewidth=style.LINE, label="Cramér-Rao bound")
-    ax.set(xlabel=f"error of {how.label}", yticks=[], xlim=(low, high))
+    ax.set(xlabel=f"error of {how.label}", yticks=[], xlim=(low, high), ylim=(0.0, 1.2 * top or 1.0))
     style.legend_above(ax)
     return ax
 

@@ -39,7 +39,7 @@ def account_section(account: Account) -> Section:
     shown = _shown(account)
     if not shown:
         return Section(heading, ["No stretch of the logs is left to judge by."])
-    figure, ax = plot.figure(size=(6.3, 0.9 + 0.28 * len(shown)))
+    figure, ax = plot.figure(size=(4.8, 0.9 + 0.28 * len(shown)))  # narrow: a phone shows all of it
     draw_account(account, ax)
     rows = [
         (part(row.part), length(row.rms_position), angle(row.rms_heading), percent(row.share),

@@ -195,7 +195,7 @@ def hidden(found: Diagnosis) -> Section:
         if missed else "This input would have shown every effect that shapes the path, at its typical size."
     )  # fmt: skip
     table = Table(("effect", "typical size", "gain", "visible", "smallest visible"), rows, HIDDEN_CAPTION)
-    return Section("What this input could have shown", [lead, table, DIRECT, *_replays(found.replay)])
+    return Section("What this input could have shown", [lead, table, DIRECT, *_replays(found.replay)], folded=True)
 
 
 def _replays(replay: Replay) -> list[str | Figure]:

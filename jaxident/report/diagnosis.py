@@ -12,6 +12,7 @@ from jaxident.origin import Origin
 from jaxident.report import causes, words
 from jaxident.report.account import account_section
 from jaxident.report.discovered import discovered
+from jaxident.report.glossary import glossary
 from jaxident.report.lead import deviations, lead
 from jaxident.report.origin import origin_section
 from jaxident.report.page import Figure, Page, Section, Table
@@ -31,6 +32,10 @@ from jaxident.report.words import (
 
 LISTED = 12
 """Regions that the table shows."""
+WORDS = (
+    *("account", "camera variance", "corrected model", "effect", "excess", "floor", "gain of an effect", "gap"),
+    *("horizon", "interval", "nominal model", "root mean square", "slip", "start not known better"),
+)
 
 
 def diagnosis_page(found: Diagnosis, name: str, made: Origin | None = None) -> Page:
@@ -44,10 +49,10 @@ def diagnosis_page(found: Diagnosis, name: str, made: Origin | None = None) -> P
         causes.shrink(found),
         _parameters(found),
         causes.hidden(found),
-        Section("What to do next", [found.next]),
+        glossary(*WORDS),
         *origin_section(made),
     ]
-    return Page(f"Diagnosis of {name}", lead(found), sections, f"jaxident {version('jaxident')}")
+    return Page(f"Diagnosis of {name}", lead(found), sections, f"jaxident {version('jaxident')}", found.next)
 
 
 def _gap(found: Diagnosis) -> Section:

@@ -15,8 +15,10 @@ from jaxident.estimation.runs import stack_runs
 from jaxident.estimation.verdict import BORROWED, Verdict
 from jaxident.files.atomic import Target
 from jaxident.log import Log, join
+from jaxident.report.glossary import glossary
 from jaxident.report.origin import origin_section
 from jaxident.report.page import Figure, Page, Section, Table, write_page
+from jaxident.report.words import SPACE, about
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,6 +50,7 @@ def _page(found: Identification, log: Log, verdicts: Sequence[Verdict], again: B
         Section("What is left", [ABOUT_TESTS, _tests(normalised, runs), *_pictures(found, log, normalised, runs.seen)]),
     ]
     told = found.model.provenance
+    sections.append(glossary(*WORDS))
     sections += origin_section(told.origin)
     return Page("The robot behind the log", _lead(found, verdicts, percent), sections, f"jaxident {told.version}")
 
@@ -67,11 +70,19 @@ def _lead(found: Identification, verdicts: Sequence[Verdict], percent: np.ndarra
 
 
 def _parameters(verdicts: Sequence[Verdict], again: Bootstrap | None) -> Table:
-    rows = [row.cells() for row in verdicts]
+    rows = [with_words(row) for row in verdicts]
     if again is None:
         return Table(COLUMNS, rows, ABOUT_INTERVALS)
-    beside = [(*row[:3], own, row[3]) for row, own in zip(rows, interval_cells(again), strict=True)]
-    return Table((*COLUMNS[:3], "bootstrap 95 %", COLUMNS[3]), beside, f"{ABOUT_INTERVALS} {describe(again)}")
+    beside = [(*row[:4], own, *row[4:]) for row, own in zip(rows, interval_cells(again), strict=True)]
+    return Table((*COLUMNS[:4], "bootstrap 95 %", *COLUMNS[4:]), beside, f"{ABOUT_INTERVALS} {describe(again)}")
+
+
+def with_words(row: Verdict) -> tuple[str, ...]:
+    """A parameter as a row of a page's table, in the order of COLUMNS."""
+    name, estimate, interval, verdict = row.cells()
+    meaning, unit = about(name)
+    told = f"{meaning} [{unit}]" if unit else meaning
+    return name, told, estimate, interval.replace(" ", SPACE), verdict
 
 
 def _doubts(found: Identification) -> list[str]:
@@ -132,7 +143,8 @@ def _pictures(found: Identification, log: Log, normalised: np.ndarray, seen: np.
     ]  # fmt: skip
 
 
-COLUMNS = ("parameter", "estimate", "95 % interval", "this input")
+WORDS = ("dead zone", "determined", "interval", "prior", "residual", "root mean square", "slip", "white")
+COLUMNS = ("parameter", "what it is", "estimate", "95 % interval", "this input")
 ABOUT_INTERVALS = (
     "Intervals hold under the noise law whose numbers stand at the end. Determined: the half-width is below a tenth of "
     "the parameter (for a dead zone, of the largest command); weak: below a half. From the prior: more than half of "

@@ -2,9 +2,9 @@
 
 CSS = """
 :root { color-scheme: light dark;
-  --text: #1b1b1b; --soft: #5a5a5a; --back: #ffffff; --line: #d8d8d8; --box: #f5f5f5; --mark: #0072b2; }
+  --text: #1b1b1b; --soft: #5a5a5a; --back: #ffffff; --line: #d8d8d8; --shade: #00000030; --mark: #0072b2; }
 @media (prefers-color-scheme: dark) { :root {
-  --text: #e6e6e6; --soft: #a8a8a8; --back: #17191c; --line: #3a3d42; --box: #212429; --mark: #56b4e9; } }
+  --text: #e6e6e6; --soft: #a8a8a8; --back: #17191c; --line: #3a3d42; --shade: #ffffff38; --mark: #56b4e9; } }
 * { box-sizing: border-box; }
 body { margin: 0; background: var(--back); color: var(--text);
   font: 1rem/1.55 system-ui, -apple-system, "Segoe UI", Roboto, "Liberation Sans", "DejaVu Sans", sans-serif; }
@@ -17,6 +17,15 @@ p { margin: 0 0 1rem; overflow-wrap: break-word; }
 figure { margin: 1.25rem 0 1.5rem; }
 figcaption { color: var(--soft); font-size: 0.9rem; margin: 0.4rem 0; }
 .wide { overflow-x: auto; }
+pre { overflow-x: auto; }
+.wide, pre { background: linear-gradient(to right, var(--back) 1rem, transparent 2rem) local,
+    linear-gradient(to left, var(--back) 1rem, transparent 2rem) local,
+    linear-gradient(to right, var(--shade), transparent 0.8rem),
+    linear-gradient(to left, var(--shade), transparent 0.8rem); }
+details { margin: 0; }
+summary { cursor: pointer; }
+summary h2 { display: inline; border: none; margin: 0; padding: 0; }
+details > summary { border-top: 1px solid var(--line); margin: 2.5rem 0 0.75rem; padding-top: 1rem; }
 .white { background: #ffffff; border: 1px solid var(--line); border-radius: 4px; padding: 0.5rem; }
 img { display: block; margin: 0 auto; max-width: 100%; height: auto; }
 table { border-collapse: collapse; font-size: 0.92rem; font-variant-numeric: tabular-nums; }
@@ -26,17 +35,18 @@ th { font-weight: 600; border-bottom: 1.5px solid var(--soft); vertical-align: b
 td { min-width: 5.5rem; }
 .number { text-align: right; min-width: 0; }
 td.number { white-space: nowrap; }
-pre { background: var(--box); border: 1px solid var(--line); border-radius: 4px; padding: 0.7rem 0.9rem; margin: 0;
-  overflow-x: auto; font: 0.85rem/1.45 ui-monospace, "Liberation Mono", "DejaVu Sans Mono", monospace; }
+pre { border: 1px solid var(--line); border-radius: 4px; padding: 0.7rem 0.9rem; margin: 0;
+  font: 0.85rem/1.45 ui-monospace, "Liberation Mono", "DejaVu Sans Mono", monospace; }
 footer { color: var(--soft); font-size: 0.85rem; margin-top: 3rem; padding-top: 0.75rem;
   border-top: 1px solid var(--line); overflow-wrap: break-word; }
 @media screen and (max-width: 34rem) {
   table { font-size: 0.84rem; }
   th, td { padding-right: 0.55rem; }
   td { min-width: 0; }
+  .white img:not(.fits) { max-width: none; width: 30rem; }
 }
 @media print {
-  :root { --text: #000000; --soft: #404040; --back: #ffffff; --line: #b0b0b0; --box: #ffffff; --mark: #000000; }
+  :root { --text: #000000; --soft: #404040; --back: #ffffff; --line: #b0b0b0; --shade: transparent; --mark: #000000; }
   @page { margin: 18mm 16mm; }
   body { font-size: 10pt; }
   main { max-width: none; padding: 0; }

@@ -18,6 +18,9 @@ NOTHING = "–"
 SCALE = 0.72
 """Size on the page [px] of a dot of a picture: one of 6.3 inches at 150 dots an inch fills the column."""
 
+NARROW = 520
+"""Width on the page [px] up to which a picture's text stays readable where it is shrunk to a phone's 340."""
+
 # Even a page that went wrong loads nothing: the browser allows its own pictures and its own style alone.
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 
@@ -47,30 +50,35 @@ class Code(NamedTuple):
 
 
 class Section(NamedTuple):
-    """A heading and what follows it: paragraphs (str), tables, figures and code in any order."""
+    """A heading and what follows it: paragraphs (str), tables, figures and code in any order. folded: it shows its
+    heading alone until a reader opens it; for what few look up."""
 
     heading: str
     blocks: Sequence["str | Table | Figure | Code"]
+    folded: bool = False
 
 
 class Page(NamedTuple):
-    """A title, the verdict in a sentence, the sections and a closing line such as version and seed."""
+    """A title, the verdict in a sentence, the sections and a closing line such as version and seed. next: what to do
+    now, in a sentence that stands below the verdict."""
 
     title: str
     lead: str
     sections: Sequence[Section]
     footer: str = ""
+    next: str = ""
 
 
 def render(page: Page) -> str:
     """The page as HTML; equal pages give equal text."""
     footer = f"<footer>{escape(page.footer)}</footer>\n" if page.footer else ""
+    follows = f"<p><strong>What to do next.</strong> {escape(page.next)}</p>\n" if page.next else ""
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{escape(page.title)}</title>\n<style>{CSS}</style>\n</head>\n<body>\n<main>\n"
-        f'<header>\n<h1>{escape(page.title)}</h1>\n<p class="lead">{escape(page.lead)}</p>\n</header>\n'
+        f'<header>\n<h1>{escape(page.title)}</h1>\n<p class="lead">{escape(page.lead)}</p>\n{follows}</header>\n'
         f"{''.join(_section(section) for section in page.sections)}{footer}</main>\n</body>\n</html>\n"
     )
 
@@ -87,6 +95,9 @@ def fragment(blocks: Sequence["str | Table | Figure | Code"]) -> str:
 
 def _section(section: Section) -> str:
     blocks = "".join(_block(block) for block in section.blocks)
+    if section.folded:
+        head = f"<summary><h2>{escape(section.heading)}</h2></summary>"
+        return f"<section>\n<details>\n{head}\n{blocks}</details>\n</section>\n"
     return f"<section>\n<h2>{escape(section.heading)}</h2>\n{blocks}</section>\n"
 
 
@@ -110,7 +121,10 @@ def _image(figure: Figure) -> str:
     """The picture in proportion to its size in dots, so that the text of all pictures is equally large."""
     width, height = (round(SCALE * size) for size in struct.unpack(">II", figure.png[16:24]))  # of the PNG header
     source = base64.b64encode(figure.png).decode("ascii")
-    return f'<img width="{width}" height="{height}" alt="{escape(figure.alt)}" src="data:image/png;base64,{source}">'
+    fits = ' class="fits"' if width <= NARROW else ""
+    return (
+        f'<img{fits} width="{width}" height="{height}" alt="{escape(figure.alt)}" src="data:image/png;base64,{source}">'
+    )
 
 
 def _table(table: Table) -> str:

@@ -1,5 +1,6 @@
 """The page of `jaxident sweep`, and the picture of one of its trials."""
 
+import json
 import math
 import os
 from typing import Any
@@ -13,6 +14,7 @@ from jaxident.files.atomic import Target
 from jaxident.log import make_log
 from jaxident.plot.names import plain, written
 from jaxident.plot.studies import Curve
+from jaxident.report.glossary import glossary
 from jaxident.report.page import Figure, Page, Section, Table, write_page
 from jaxident.robot.model import DIFFERENCE_ORDER
 from jaxident.robot.path_length import path_length
@@ -42,13 +44,30 @@ def _page(study: Study, trials: xarray.Dataset, summary: xarray.Dataset) -> Page
         Section("Error against noise", [_where(summary, base), *(_curves(summary, base, name) for name in SHOWN)]),
         Section("Maps", [_map_text(), *_maps(summary, base)]),
         Section("Distributions", [_histogram(study, trials, summary, name) for name in SHOWN]),
-        Section("All numbers", [_numbers(summary.isel(base))]),
+        Section("All numbers", [_numbers(summary.isel(base))], folded=True),
+        glossary("bias", "coverage", "interval", "Monte-Carlo error", "root mean square"),
     ]
-    versions = trials.attrs["versions"]
-    return Page(study.name, _lead(study, summary), sections, f"seed {study.seed}; {versions}")
+    versions = ", ".join(f"{name} {found}" for name, found in json.loads(trials.attrs["versions"]).items())
+    lead = f"{_finding(summary)} {_counts(study, summary)}"
+    return Page(study.name, lead, sections, f"Seed {study.seed}; {versions}.")
 
 
-def _lead(study: Study, summary: xarray.Dataset) -> str:
+def _finding(summary: xarray.Dataset) -> str:
+    """How much camera noise each estimator bears, over all cells."""
+    told, most = [], 1e3 * float(summary["noise"].max())
+    for one in map(str, summary["estimator"].values):
+        levels = 1e3 * summary["breakdown"].sel(estimator=one).values.ravel()
+        broken = levels[np.isfinite(levels)]
+        if not broken.size:
+            told.append(f"{one} bears all camera noise that was tried, up to {most:.4g} mm")
+            continue
+        span = " to ".join(f"{level:.4g}" for level in sorted({broken.min(), broken.max()}))
+        some = f" in {broken.size} of {levels.size} cases" if broken.size < levels.size else ""
+        told.append(f"{one} is broken from {span} mm of camera noise on{some}")
+    return f"{'; '.join(told)}."
+
+
+def _counts(study: Study, summary: xarray.Dataset) -> str:
     failed = int(summary["failures"].sum())
     every = study.trials * len(study.estimators)
     axes = ", ".join(f"{n} {_plural(axis, n)}" for axis, n in zip(study.axes, study.shape, strict=True) if n > 1)

@@ -51,7 +51,7 @@ VARIABLES = {
 }
 """Variables of the map: in words, unit, and the power of the largest command that brings them to the user's unit."""
 
-NOMINAL = {
+NOMINAL: dict[str, tuple[str, str]] = {
     "rate_1": ("how fast the speed settles", "1/s"),
     "rate_2": ("how fast the turn rate settles", "1/s"),
     "gain_11": ("right motor to forward acceleration", f"m/s²/{UNIT}"),
@@ -64,6 +64,31 @@ NOMINAL = {
     "coupling_2": ("speed to turning acceleration", "rad/s²/(m/s)"),
 }
 """The nominal parameters: in words, and their unit."""
+
+NOISE = {
+    "position": ("camera noise in position", "m"),
+    "heading": ("camera noise in heading", "rad"),
+    "correlation_time": ("memory of the camera's error", "s"),
+    "slip_along": ("random slip, forward", "m/s^1.5"),
+    "slip_heading": ("random slip, turning", "rad/s^1.5"),
+}
+"""The numbers of the noise law: in words, and their unit."""
+
+DIFFERENCE = {
+    "alpha_1": ("part of the path length that stays to the next row", ""),
+    "alpha_2": ("part of the turn that stays to the next row", ""),
+    "delta_1": ("motor to path length, one row later", f"m/{UNIT}"),
+    "delta_2": ("motor to turn, one row later", f"rad/{UNIT}"),
+    "epsilon_1": ("motor to path length, two rows later", f"m/{UNIT}"),
+    "epsilon_2": ("motor to turn, two rows later", f"rad/{UNIT}"),
+}
+"""The numbers of the difference equations, numerators by their channel: in words, and their unit."""
+
+
+def about(parameter: str) -> tuple[str, str]:
+    """A parameter of any form of the model in words, and its unit; empty for a name that is none."""
+    every = NOMINAL | NOISE | DIFFERENCE
+    return every.get(parameter) or every.get(parameter[:-1], ("", ""))
 
 
 def plain(name: str) -> str:
@@ -92,6 +117,7 @@ def measured(value: float, deviation: float | None, unit: str = "") -> str:
     digits = 1 - floor(log10(deviation))
     if digits > 6 or digits < 0:
         return f"{number(value)}{SPACE}±{SPACE}{number(deviation)}{behind}"
+    value = round(value, digits) + 0.0  # no minus before a zero
     return f"{value:.{digits}f}{SPACE}±{SPACE}{deviation:.{digits}f}{behind}".replace("-", "\N{MINUS SIGN}")
 
 

@@ -23,6 +23,12 @@ def path_length(poses: Pose) -> Increment:
 
     Hot: elementwise along the samples, so trials may follow on a last axis; there `c[:-1]` and `c[1:]` are whole rows
     of contiguous trials and everything is one sweep, while samples last would leave odd ends in every trial.
+
+    Examples:
+        >>> import jax.numpy as jnp, jaxident as ji
+        >>> back = ji.Pose(jnp.array([0.0, 0.1, 0.0]), jnp.zeros(3), jnp.zeros(3))
+        >>> ji.path_length(back).length.round(3).tolist()
+        [0.1, -0.1]
     """
     heading = sin_cos(poses.theta)
     start, end = Pose(*(c[:-1] for c in poses)), Pose(*(c[1:] for c in poses))

@@ -100,6 +100,14 @@ def summarise(trials: xarray.Dataset, bound: xarray.DataArray | None = None) -> 
 
     trials may lie on disk: little of them is read at a time. bound: smallest standard deviation possible, such as
     Cramer and Rao's, on any of the axes of the result; adds `rmse_over_bound`.
+
+    Examples:
+        >>> import jaxident as ji
+        >>> ji.start_jax()
+        >>> content = {"seeds": 8, "noise": [1e-5], "robots": [{"model": "published"}], "estimators": ["batch"]}
+        >>> trials = ji.study(content)
+        >>> ji.summarise(trials).rmse.sel(parameter="alpha_1").squeeze().dims
+        ()
     """
     shape = tuple(trials.sizes[axis] for axis in (*cell_axes(trials), "estimator", "parameter"))
     found = {name: np.full(shape, np.nan) for name in Errors._fields[:-1]}

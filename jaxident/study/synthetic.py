@@ -14,7 +14,13 @@ from jaxident.robot.noise import Noise
 
 
 def excite(key: Array, name: str, samples: int, period: float, *, amplitude: float = 1.0, hold: int = 20) -> Log:
-    """A log (samples,) of commands alone, even at `period` [s]; name is one of `EXCITATIONS`."""
+    """A log (samples,) of commands alone, even at `period` [s]; name is one of `EXCITATIONS`.
+
+    Examples:
+        >>> import jax, jaxident as ji
+        >>> ji.excite(jax.random.key(0), "prbs", 100, 0.05, amplitude=0.8)
+        Log of 100 rows in 1 run(s), 4.95 s, 0 % with a pose
+    """
     command = jax.jit(EXCITATIONS[name], static_argnums=(1, 3))(key, samples, amplitude, hold)
     return make_log(period * np.arange(samples), np.asarray(command.right), np.asarray(command.left))
 

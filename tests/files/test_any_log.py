@@ -30,6 +30,9 @@ def test_every_form_gives_the_same_log(tmp_path):
     assert [len(log.t) for log in as_logs([tmp_path, LOG, columns])] == [4, 2, 4, 4]
     assert as_log(tmp_path).run.tolist() == [0, 0, 0, 0, 1, 1]
     assert same(ji.read_log(tmp_path), as_log([LOG, LOG[:2]]))
+    assert same(ji.read_log(sorted(tmp_path.glob("*.csv"))), as_log([LOG, LOG[:2]]))
+    with pytest.raises(InputError, match="empty list"):
+        ji.read_log([])
 
 
 def test_a_pandas_frame_is_a_log(tmp_path):

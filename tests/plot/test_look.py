@@ -3,6 +3,7 @@
 import subprocess
 import sys
 
+import matplotlib
 import numpy as np
 import pytest
 from matplotlib import pyplot
@@ -66,3 +67,19 @@ def test_an_unknown_picture_is_an_attribute_error():
     with pytest.raises(AttributeError, match="no attribute 'pie'"):
         plot.pie  # noqa: B018
     assert "path" in dir(plot)
+
+
+def test_a_backend_that_loads_with_the_first_picture_keeps_what_it_sets(monkeypatch):
+    made = pyplot.figure
+
+    def load_and_make(*args, **settings):
+        matplotlib.interactive(True)  # as the backend of a notebook does, which shows each cell's pictures by it
+        return made(*args, **settings)
+
+    monkeypatch.setattr(pyplot, "figure", load_and_make)
+    try:
+        plot.dead_zone([0.2])
+        assert matplotlib.is_interactive()
+    finally:
+        matplotlib.interactive(False)
+        pyplot.close("all")

@@ -94,6 +94,13 @@ def test_wide_things_scroll_in_a_box_of_their_own():
     assert ".wide { overflow-x: auto; }" in text
 
 
+def test_a_folded_section_shows_its_heading_alone_and_what_to_do_next_stands_in_the_head():
+    text = render(page(sections=[Section("All & more", ["Long."], folded=True)], next="Record <more>."))
+    assert Outline(text).all("details") == [{}]
+    assert "<summary><h2>All &amp; more</h2></summary>\n<p>Long.</p>" in text
+    assert "Record &lt;more&gt;.</p>\n</header>" in text
+
+
 def test_empty_parts_leave_no_trace():
     text = render(page(sections=[Section("s", [Table(["a", "b"], [])])], footer=""))
     Outline(text)
