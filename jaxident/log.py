@@ -52,7 +52,8 @@ class Log(_Columns):
         columns = t, u_r, u_l, x, y, theta, run
         if wheel_r is None and wheel_l is None:
             return tuple.__new__(Log, columns)
-        check_both_wheels("log", [k for k, column in zip(WHEELS, (wheel_r, wheel_l), strict=True) if column is not None])
+        given = {"wheel_r": wheel_r, "wheel_l": wheel_l}
+        check_both_wheels("log", [name for name, column in given.items() if column is not None])
         return tuple.__new__(LogWithWheels, (*columns, wheel_r, wheel_l))
 
     @classmethod
@@ -228,8 +229,7 @@ def run_begins(log: Log) -> np.ndarray:
 
 def first_rows(log: Log) -> np.ndarray:
     """Boolean (samples,): the first row of each run."""
-    run = np.asarray(log.run)
-    return np.concatenate([[True], run[1:] != run[:-1]])
+    return np.concatenate([[True], np.diff(log.run) != 0])
 
 
 def even_period(log: Log) -> float:
