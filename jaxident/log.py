@@ -162,8 +162,7 @@ def make_log(t, u_r, u_l, x=None, y=None, theta=None, run=None, wheel_r=None, wh
     """A log from arrays (samples,); columns left out are a camera that saw nothing, a single run, no wheel speeds."""
     blind = np.full(np.shape(t), np.nan)
     x, y, theta = (blind if column is None else column for column in (x, y, theta))
-    run = np.zeros(np.shape(t), int) if run is None else run
-    return Log(t, u_r, u_l, x, y, theta, run, wheel_r, wheel_l)
+    return Log(t, u_r, u_l, x, y, theta, np.zeros(np.shape(t), int) if run is None else run, wheel_r, wheel_l)
 
 
 def from_columns(columns: Mapping[str, Any], name: str = "log") -> Log:
