@@ -19,7 +19,7 @@ from jaxident.log import make_log
 
 ROWS = 200
 WORDS = ("convert", "--commands", "data/c.csv", "--poses", "data/p.csv", "--track", "0.3", "--out", "log.csv")
-FREE_WORDS = {"between", "child_frame", "command_topic", "effect", "pose_topic", "scheduler"}
+FREE_WORDS = {"between", "child_frame", "command_topic", "effect", "pose_topic", "wheels_topic", "scheduler"}
 """Parameters of any text that name no file."""
 
 

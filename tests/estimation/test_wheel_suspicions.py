@@ -120,6 +120,7 @@ def test_wheels_in_the_air_are_named(log):
         ji.identify(air)
 
 
+@pytest.mark.slow
 def test_identify_leaves_contradicting_wheels_aside_and_says_so(log):
     alone = ji.identify(log._replace(wheel_r=None, wheel_l=None), noise_law="white")
     found = ji.identify(with_speeds(log, lambda r, s: (s, r)), noise_law="white")
