@@ -91,30 +91,33 @@ def ranking(
     gains: Mapping[str, float], needed: Mapping[str, float], *, notes: Mapping[str, str] | None = None,
     groups: Mapping[str, str] | None = None, ax: Axes | None = None,
 ) -> Axes:  # fmt: skip
-    """Candidates as bars of their gain (fall of -log p from the nominal fit), best on top.
+    """Candidates as points at their gain (fall of -log p from the nominal fit), best on top.
 
-    needed: the gain from which each is claimed, a black tick. notes: text behind a bar. groups: what a candidate is,
-    one colour each; those left out are grey. The axis is logarithmic where gains span decades.
+    needed: the gain from which each is claimed, a black tick. notes: text behind a point. groups: what a candidate is,
+    one colour each; those left out are grey. The axis is logarithmic where gains span decades; the length of a bar
+    would mislead there.
     """
     ax = style.axes_or_new(ax, (style.WIDTH, 0.8 + 0.25 * max(len(gains), 2)))
     places, groups = np.arange(len(gains)), groups or {}
     told = list(dict.fromkeys(groups.values()))
     values = np.maximum(np.array(list(gains.values()), float), 0.0)
     logarithmic = values.size > 0 and values.max() > DECADES * max(values.min(), WEAKEST)
+    least = min(1.0, max(values.min(initial=WEAKEST), WEAKEST)) if logarithmic else 0.0
     for group in [*told, None]:
         here = [k for k, name in enumerate(gains) if groups.get(name) == group]
-        colour = style.GREY if group is None else style.SERIES[told.index(group) % len(style.SERIES)][0]
-        ax.barh(places[here], values[here], 0.66, color=colour, label=group or "others" if here else "_")
+        colour, marker = (style.GREY, "o") if group is None else style.SERIES[told.index(group) % len(style.SERIES)]
+        ax.plot(np.maximum(values[here], least), places[here], linestyle="none", marker=marker, markersize=6.0,
+                color=colour, clip_on=False, label=group or "others" if here else "_")  # fmt: skip
     ticks = np.array([needed[name] for name in gains])
     ax.vlines(ticks, places - 0.42, places + 0.42, color=style.TRUE, linewidth=1.4, label="needed")
     if logarithmic:
         ax.set_xscale("log")
-        ax.set_xlim(left=min(1.0, max(values.min(), WEAKEST)))
+    ax.set_xlim(left=0.8 * least)  # names stay clear of the points
     for place, (name, value, tick) in enumerate(zip(gains, values, ticks, strict=True)):
         text, end = (notes or {}).get(name, ""), max(value, ax.get_xlim()[0])
         if 0.5 * tick < end < tick:  # clear of the tick
             end = tick
-        ax.annotate(text, (end, place), (4, 0), textcoords="offset points", va="center", fontsize=style.TEXT - 1)
+        ax.annotate(text, (end, place), (7, 0), textcoords="offset points", va="center", fontsize=style.TEXT - 1)
     low, high = ax.get_xlim()
     ax.set_xlim(low, high**1.15 if logarithmic else 1.15 * high)
     name_rows(ax, list(gains))

@@ -91,7 +91,7 @@ def _ranking(found: Diagnosis) -> Figure | str:
                  {name: each.gain - each.evidence for name, each in names.items()},
                  notes={name: chance(taking.get(each.effect, 0.0)) for name, each in names.items()},
                  groups={name: group for name, group in groups.items() if group}, ax=ax)  # fmt: skip
-    caption = "The most promising effects; behind each bar the probability that the effect takes part."
+    caption = "The most promising effects; behind each point the probability that the effect takes part."
     return Figure(plot.image(figure), "Effects by the gain that each brings beside the others", caption)
 
 
