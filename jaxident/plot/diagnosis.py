@@ -102,14 +102,14 @@ def ranking(
     told = list(dict.fromkeys(groups.values()))
     values = np.maximum(np.array(list(gains.values()), float), 0.0)
     logarithmic = values.size > 0 and values.max() > DECADES * max(values.min(), WEAKEST)
+    ticks = np.array([needed[name] for name in gains])
+    ax.vlines(ticks, places - 0.42, places + 0.42, color=style.TRUE, linewidth=1.4, label="needed")
     least = min(1.0, max(values.min(initial=WEAKEST), WEAKEST)) if logarithmic else 0.0
     for group in [*told, None]:
         here = [k for k, name in enumerate(gains) if groups.get(name) == group]
         colour, marker = (style.GREY, "o") if group is None else style.SERIES[told.index(group) % len(style.SERIES)]
         ax.plot(np.maximum(values[here], least), places[here], linestyle="none", marker=marker, markersize=6.0,
                 color=colour, clip_on=False, label=group or "others" if here else "_")  # fmt: skip
-    ticks = np.array([needed[name] for name in gains])
-    ax.vlines(ticks, places - 0.42, places + 0.42, color=style.TRUE, linewidth=1.4, label="needed")
     if logarithmic:
         ax.set_xscale("log")
     ax.set_xlim(left=0.8 * least)  # names stay clear of the points
