@@ -10,7 +10,6 @@ import numpy as np
 
 from jaxident.array_types import Pose, Wheels
 from jaxident.estimation.clock_offset import PAUSE, Response, Streams, respond, streams_of
-from jaxident.estimation.residual_tests import whiteness
 from jaxident.estimation.wheel_answer import late_wheels, typical_step
 from jaxident.log import Log
 
@@ -31,8 +30,6 @@ LARGEST_OFFSET = 5.0
 SMALLEST_RATIO, LARGEST_RATIO = 0.04, 1.0
 """Radius over track of robots on wheels, with room: a Create has 0.15, a TurtleBot3 0.2, a Husky 0.3, in turns 0.15.
 Speeds in rpm take it to a tenth, rim speeds in m/s to 1 / track."""
-WHITE = 23.2
-"""Largest sum of squared residual correlations, 10 of two wheels, of white residuals: chi-squared, 1 in 100."""
 NEAR_ONE = 0.1
 """Radii [m] this near to 1 look like rim speeds in m/s; robots have smaller wheels."""
 
@@ -136,20 +133,6 @@ def wheel_signs(response: Response) -> str:
     }
     line = found.get(tuple(int(s) for s in np.sign(response.gain).ravel()), "")
     return f"{line} (signs of the gains, each {SURE:g} standard deviations clear)" if line else ""
-
-
-def wheel_colour(normalised: Any, turning: Wheels) -> list[str]:
-    """A line where the residuals (runs, 2, rows) of a fit to wheel speeds are not white: the motors do something that
-    the model has not, and intervals are too narrow."""
-    seen = np.asarray(turning.right) & np.asarray(turning.left)
-    residual = np.where(seen[:, None], np.asarray(normalised), 0.0)
-    found = float(np.sum(whiteness(residual, seen)))
-    if found < WHITE:
-        return []
-    return [
-        f"residuals of the wheel speeds are coloured ({found:.0f}, white ones below {WHITE:g}): the motors do "
-        "something that the model has not, such as a delay; intervals are too narrow"
-    ]
 
 
 def sensor_of(response: Response) -> tuple[float, float]:
