@@ -90,7 +90,7 @@ def test_of_a_robot_without_effects_none_is_named():
     assert finding.selected == ()
     assert finding.values[frozenset()] == 0.0
     assert max(value for effects, value in finding.values.items() if effects) < 0.0
-    assert finding.gain == 0.0
+    assert finding.gain < 1e-9  # of two fits that end at one place by other ways
     np.testing.assert_array_equal(finding.fit.vector[len(NOMINAL) :], VECTOR[len(NOMINAL) :])
 
 

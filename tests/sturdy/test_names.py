@@ -30,7 +30,7 @@ EVIL = "<script>alert('1')</script> \"q\" ../../x $\\frac{$ _y & &amp; é"
 """Markup, both quotes, a way out of the folder, half a formula, an entity."""
 ALLOWED = {"html", "head", "meta", "title", "style", "body", "main", "header", "h1", "h2", "p", "section", "figure",
            "div", "img", "figcaption", "table", "thead", "tbody", "tr", "th", "td", "pre", "code",
-           "footer"}  # fmt: skip
+           "footer", "details", "summary", "strong"}  # fmt: skip
 
 
 class Tags(HTMLParser):
