@@ -9,8 +9,8 @@ import numpy as np
 
 from jaxident.array_types import Array, Pose
 from jaxident.errors import InputError, WorkError
-from jaxident.estimation.maximum_likelihood import Fit
-from jaxident.estimation.noise_law import NOISE_LAWS, WHITE, colour, fit_law
+from jaxident.estimation.maximum_likelihood import Fit, uncertain_as_by
+from jaxident.estimation.noise_law import WHITE, colour, fit_law
 from jaxident.estimation.parameters import Law, names, to_vector
 from jaxident.estimation.precision import difference_covariance, spread_of
 from jaxident.estimation.prior import RATE, from_prior
@@ -52,7 +52,7 @@ def identify_poses(log: Log, d_max: float, noise_law: str, coupling: bool) -> Po
     runs = stack_runs(log)
     if log.wheel_r is not None:
         runs = with_wheels(runs, log)
-    fit, law, runs, doubts = _fitted(runs, d_max, noise_law, coupling)
+    fit, law, doubts = _fitted(runs, d_max, noise_law, coupling)
     if not all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves((fit.robot, fit.covariance))):
         raise WorkError("the maximum-likelihood estimate is not finite: the log does not determine the model")
     doubts = (*_suspicions(fit, law, runs, noise_law), *doubts, *log_suspicions(log))
@@ -60,24 +60,23 @@ def identify_poses(log: Log, d_max: float, noise_law: str, coupling: bool) -> Po
     return PoseFit(_model(fit, law, float(np.median(_steps(log)))), _residuals(fit, runs, log), fit, law, doubts)
 
 
-def _fitted(runs: Runs, d_max: float, noise_law: str, coupling: bool) -> tuple[Fit, Law, Runs, tuple[str, ...]]:
-    """The fit, its law, and the runs that it counts. Where residuals of wheel speeds hang together, the fit is made
-    again with so few of them that they do not: taken for independent they would make every interval too narrow."""
+def _fitted(runs: Runs, d_max: float, noise_law: str, coupling: bool) -> tuple[Fit, Law, tuple[str, ...]]:
+    """The fit, its law and a line where residuals of wheel speeds hang together. The covariance then counts so few of
+    them that they do not: taken for independent they would make every interval too narrow."""
     fit, law = fit_law(jax.tree.map(jnp.asarray, runs), jnp.asarray(d_max), noise_law, coupling)
     if not law.wheels:
-        return fit, law, runs, ()
+        return fit, law, ()
     found = wheel_colour(fit.innovations.turning, runs.turning)
     every = spacing(fit.innovations.turning, runs.turning)
     if found < WHITE_WHEELS or every == 1:
-        return fit, law, runs, ()
-    runs = thinned(runs, every)
-    name = next(name for name, own in NOISE_LAWS.items() if (own.memory, own.slip) == (law.memory, law.slip))
-    fit, law = fit_law(jax.tree.map(jnp.asarray, runs), jnp.asarray(d_max), name, coupling)
+        return fit, law, ()
     line = (
         f"residuals of the wheel speeds are coloured ({found:.0f}, white ones below {WHITE_WHEELS:g}): the motors do "
-        f"what the model has not, such as a delay; one wheel speed in {every} counts: so few are independent"
+        f"what the model has not, such as a delay; one wheel speed in {every} counts for the intervals, as so few are "
+        "independent"
     )
-    return fit, law, runs, (line,)
+    few = jax.tree.map(jnp.asarray, thinned(runs, every))
+    return jax.device_get(uncertain_as_by(fit, few, law)), law, (line,)
 
 
 def _with_commands(log: Log) -> Log:

@@ -12,7 +12,7 @@ from jaxident.estimation.likelihood import Innovations, innovations
 from jaxident.estimation.parameters import Law, Robot, from_vector, to_vector
 from jaxident.estimation.prior import Prior, prior_of
 from jaxident.estimation.runs import Runs, cut_windows, run_axes
-from jaxident.estimation.scoring import Point, Search, search_from, with_prior
+from jaxident.estimation.scoring import Point, Search, local_at, search_from, with_prior
 from jaxident.estimation.starter import Start, channels, first_estimate, start_states
 from jaxident.estimation.wheel_likelihood import first_sensor
 from jaxident.numerics import in_blocks
@@ -44,7 +44,7 @@ class Fit(NamedTuple):
     innovations: Innovations
     ok: Any
     steps: Any
-    prior: Prior | None = None
+    prior: Any = None
     prior_share: Any = None
 
 
@@ -111,6 +111,15 @@ def fit_from(beginning: Beginning, runs: Runs, d_max: Array, law: Law, prior: Pr
         prior=prior,
         prior_share=share,
     )
+
+
+@partial(jax.jit, static_argnames=("law",))
+def uncertain_as_by(fit: Fit, runs: Runs, law: Law) -> Fit:
+    """The fit where it is, with the covariance and the prior's share that some runs (runs, rows) by themselves give."""
+    point = Point(to_vector(fit.robot, law), fit.starts)
+    local = with_prior(local_at(point, runs, law), point.shared, law, fit.prior)
+    covariance, share = posterior_at(point, local, law, fit.prior)
+    return fit._replace(covariance=covariance, prior_share=share)
 
 
 def _regular(search: Search, covariance: Array, runs: Runs) -> Array:

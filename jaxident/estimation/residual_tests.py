@@ -60,10 +60,11 @@ def correlations(normalised: np.ndarray, seen: np.ndarray, lags: Any) -> np.ndar
 
 
 def whiteness(normalised: Any, seen: Any) -> np.ndarray:
-    """Sum (3,) over LAGS of n r^2, r the correlation of residuals (runs, 3, rows) at a lag and n the poses seen (runs,
-    rows): about chi-squared for white ones (Box and Pierce 1970)."""
+    """Sum (3,) over LAGS of n r^2, r the correlation of residuals (runs, 3, rows) at a lag and n the pairs of rows seen
+    (runs, rows) that it is made of: about chi-squared for white ones (Box and Pierce 1970), also where rows miss."""
     normalised, seen = np.asarray(normalised), np.asarray(seen)
-    return max(int(np.sum(seen)), 1) * np.sum(correlations(normalised, seen, LAGS) ** 2, axis=1)
+    pairs = [np.sum(seen[:, lag:] & seen[:, : seen.shape[1] - lag]) for lag in LAGS]
+    return np.sum(np.array(pairs) * correlations(normalised, seen, LAGS) ** 2, axis=1)
 
 
 def residual_tests(normalised: np.ndarray, seen: np.ndarray, command: Any) -> list[ResidualTest]:

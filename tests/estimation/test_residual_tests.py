@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from jaxident.array_types import Pose, Wheels
-from jaxident.estimation.residual_tests import correlations, fit_percent, residual_tests
+from jaxident.estimation.residual_tests import (
+    LAGS,
+    WHITE_CHANNEL,
+    correlations,
+    fit_percent,
+    residual_tests,
+    whiteness,
+)
 from jaxident.log import make_log
 
 RUNS, ROWS = 3, 500
@@ -62,3 +69,17 @@ def test_fit_percent_by_hand():
     turn = (2 * np.pi - 6.0) ** 2 / 2 + 0.5
     expected = 100.0 * (1.0 - np.sqrt([0.25, 0.25, 1.0 / turn]))
     np.testing.assert_allclose(fit_percent(log, Pose(residual, residual, residual)), expected)
+
+
+def test_white_residuals_are_white_whatever_rows_miss():
+    """400 logs, three rows of four missing at random: chi-squared with a degree of freedom per lag has mean 5 and
+    exceeds its limit in 1 of 100. A sum that counts rows where it should count pairs of rows has mean 20."""
+    found = []
+    for seed in range(400):
+        normalised, seen = (
+            np.random.default_rng(seed).normal(size=(2, 3, 400)),
+            np.random.default_rng(seed).random((2, 400)) < 0.25,
+        )
+        found.append(whiteness(normalised * seen[:, None], seen))
+    assert np.mean(found) == pytest.approx(len(LAGS), abs=0.4)
+    assert np.mean(np.array(found) > WHITE_CHANNEL) < 0.025
