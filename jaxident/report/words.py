@@ -71,8 +71,11 @@ NOISE = {
     "correlation_time": ("memory of the camera's error", "s"),
     "slip_along": ("random slip, forward", "m/s^1.5"),
     "slip_heading": ("random slip, turning", "rad/s^1.5"),
+    "wheel_radius": ("radius of a wheel, as its speed shows it", "m"),
+    "wheel_track": ("distance of the wheels, as their speeds show it", "m"),
+    "wheel_noise": ("noise of a wheel's speed", "rad/s"),
 }
-"""The numbers of the noise law: in words, and their unit."""
+"""The numbers of the noise law and of the wheels as a second sensor: in words, and their unit."""
 
 DIFFERENCE = {
     "alpha_1": ("part of the path length that stays to the next row", ""),
