@@ -20,6 +20,7 @@ from jaxident.report.glossary import TERMS  # noqa: E402
 COPIED = {
     "README.md": "index.md",
     "CHANGELOG.md": "changelog.md",
+    "CONTRIBUTING.md": "contributing.md",
     **{
         f"experiments/{name}": name
         for name in (
