@@ -10,7 +10,7 @@ Names are looked up on first use, so that importing the package stays light.
 import importlib
 from typing import Any
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _HOMES = {
     "Log": "jaxident.log",
