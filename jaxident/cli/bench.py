@@ -9,16 +9,18 @@ from jaxident.start import start_jax
 
 
 @click.command("bench", cls=Recorded)
-@click.option("--trials", type=click.IntRange(50), default=1000, show_default=True, help="Whole trials in a batch.")
+@click.option(
+    "--trials", type=click.IntRange(50), default=1000, show_default=True, help="How many whole trials a batch has."
+)
 @seed_option
 @json_option
 def command(trials, seed, json_file):
-    """How fast the pipeline is on this machine, in double precision, on all its cores or GPUs.
+    """Measure how fast this machine is, in double precision, on all its cores or GPUs.
 
-    Nanoseconds per trial-sample of each stage at 1024 trials of 2000 samples, whole trials of 1000 samples per
-    second, milliseconds for the start values of one trial in a batch, and microseconds for one robot's recursion to
-    take one row, medians of seven; milliseconds for one maximum-likelihood fit in a batch of 64 runs of 1000 samples,
-    the median of three.
+    It prints five numbers. Four are medians of seven tries: nanoseconds of each stage for one sample of one trial (1024
+    trials of 2000 samples), whole trials of 1000 samples per second, milliseconds for the start values of one trial in
+    a batch, and microseconds in which the recursion takes one row of one robot. The fifth is the median of three tries:
+    milliseconds of one maximum-likelihood fit in a batch of 64 runs of 1000 samples.
 
     Example: jaxident bench --json bench.json
     """

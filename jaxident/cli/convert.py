@@ -18,36 +18,46 @@ OFFSET_ADVICE = re.compile(r"jaxident convert --log LOG --pose-offset (\S+) --ou
 @click.option("--commands", metavar="CSV", help="Columns t,v,w or t,u_r,u_l.")
 @click.option("--poses", metavar="CSV", help="Columns t,x,y,theta or t,x,y,qx,qy,qz,qw.")
 @click.option("--wheels", metavar="CSV", help="Columns t,wheel_r,wheel_l: measured wheel speeds [rad/s].")
-@click.option("--log", metavar="LOG", help="A finished log (file or folder) in place of both, for --pose-offset, "
+@click.option("--log", metavar="LOG", help="A finished log (file or folder) to mend, with --pose-offset, "
               "--period and --columns.")  # fmt: skip
-@click.option("--bag", metavar="PATH", help="A ROS bag in place of both: .bag, .db3, .mcap or a ROS 2 folder.")
-@click.option("--list", "listing", is_flag=True, help="Show the topics of --bag, and which look right.")
-@click.option("--command-topic", metavar="T", help="Twist, TwistStamped, Float64MultiArray or JointState.")
+@click.option("--bag", metavar="PATH", help="A ROS bag that has both streams: .bag, .db3, .mcap or a ROS 2 folder.")
+@click.option("--list", "listing", is_flag=True, help="Show the topics of --bag, and what each could be.")
 @click.option(
-    "--pose-topic", metavar="T", help="PoseStamped, PoseWithCovarianceStamped, TransformStamped, tf, Odometry."
+    "--command-topic", metavar="T", help="Topic of the commands: Twist, TwistStamped, Float64MultiArray or JointState."
+)
+@click.option(
+    "--pose-topic",
+    metavar="T",
+    help="Topic of the poses: PoseStamped, PoseWithCovarianceStamped, TransformStamped, tf or Odometry.",
 )
 @click.option("--wheels-topic", metavar="T", help="JointState whose velocities are measured wheel speeds [rad/s].")
 @click.option("--wheel-joints", type=ORDER, help="Which joints of --wheels-topic are the wheels, the right one first.")
-@click.option("--child-frame", metavar="F", help="Of a tf topic: the frame that moves with the robot.")
+@click.option("--child-frame", metavar="F", help="In a tf topic, the frame that moves with the robot.")
 @click.option("--pose-frames", type=FRAMES, help="Compose tf from a fixed frame to the robot's, as in "
               "map,base_link.")  # fmt: skip
 @click.option("--wheel-order", type=ORDER, help="Which numbers or joints are the wheels, the right one first.")
-@click.option("--bag-time", is_flag=True, help="Times of recording in place of the headers' stamps.")
+@click.option("--bag-time", is_flag=True, help="Use the times of recording instead of the stamps in the messages.")
 @columns_option
-@click.option("--command-columns", type=ColumnsOption(), default="", help="As --columns, for the commands alone.")
-@click.option("--pose-columns", type=ColumnsOption(), default="", help="As --columns, for the poses alone.")
-@click.option("--wheels-columns", type=ColumnsOption(), default="", help="As --columns, for the wheel speeds alone.")
-@click.option("--period", type=above_zero, metavar="S", help="Rows at this even period; without it one row per event.")
+@click.option("--command-columns", type=ColumnsOption(), default="", help="Like --columns, only for the commands.")
+@click.option("--pose-columns", type=ColumnsOption(), default="", help="Like --columns, only for the poses.")
+@click.option("--wheels-columns", type=ColumnsOption(), default="", help="Like --columns, only for the wheel speeds.")
+@click.option(
+    "--period",
+    type=above_zero,
+    metavar="S",
+    help="Write rows at this even period. Without it there is one row for each message.",
+)
 @click.option("--track", type=above_zero, metavar="W", help="Distance between the wheels [m], for commands in v,w.")
-@click.option("--pose-offset", type=OffsetOption(), default="0", show_default=True, help="Time added to the poses'; "
-              "auto finds it, a delay of the robot included.")  # fmt: skip
-@click.option("--wheels-offset", type=OffsetOption(), default="0", show_default=True, help="Time added to the wheel "
-              "speeds'; auto finds the one at which they fit the poses.")  # fmt: skip
+@click.option("--pose-offset", type=OffsetOption(), default="0", show_default=True, help="Seconds to add to the times "
+              "of the poses. auto finds them; a delay of the robot is part of what it finds.")  # fmt: skip
+@click.option("--wheels-offset", type=OffsetOption(), default="0", show_default=True, help="Seconds to add to "
+              "the times of the wheel speeds. auto finds those at which they fit the poses.")  # fmt: skip
 @click.option("--hold-timeout", type=above_zero, metavar="S", help="A command older than this counts as zero.")
 @click.option("--out", metavar="LOG", help="The log to write (.csv or .csv.gz).")
 def command(**chosen):
-    """Two streams, each with its own times, to one log, measured wheel speeds perhaps as a third; or a log to a better
-    one. A topic's pose is never interpolated.
+    """Make one log of two streams, commands and poses, each with its own times; or mend a finished log.
+
+    Measured wheel speeds may be a third stream. A pose of one topic is never interpolated.
 
     Example: jaxident convert --commands cmd.csv --poses mocap.csv --track 0.26 --period 0.05 --out log.csv
 

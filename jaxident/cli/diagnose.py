@@ -43,15 +43,16 @@ class SeveralPerOption(Recorded):
 @click.command("diagnose", cls=SeveralPerOption)
 @click.argument("logs", nargs=-1, required=True, metavar="LOG...")
 @click.option("--sim", multiple=True, metavar="LOG...", help="Logs of your own simulator, after those of the robot.")
-@click.option("--model", metavar="MODEL", help="A model to judge as it stands, effects included.")
-@click.option("--horizon", type=above_zero, metavar="S", help="Seconds ahead (default: 1).")
+@click.option("--model", metavar="MODEL", help="Judge this model, with its effects, instead of one fitted to the logs.")
+@click.option("--horizon", type=above_zero, metavar="S", help="How many seconds ahead errors are judged (default: 1).")
 @click.option("--out", default="diagnosis", show_default=True, metavar="DIR", help="The folder to write.")
 @columns_option
 @seed_option
 def command(logs, columns, sim, model, horizon, out, seed):
-    """The sim-to-real gap: where it lies, which unmodelled effect causes it, how far it shrinks with that effect.
+    """Find the sim-to-real gap: how large it is, which effects cause it, and how far it shrinks with them.
 
-    LOG: files or a folder; in a folder `sim_*` are logs of your simulator. The same logs and seed give the same result.
+    LOG is a file or a folder. In a folder, files named `sim_*` are logs of your simulator. The same logs and seed give
+    the same result.
 
     Example: jaxident diagnose run_1.csv run_2.csv run_3.csv --out diagnosis
     """

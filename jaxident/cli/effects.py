@@ -13,9 +13,9 @@ WIDTH = 100
 @click.command()
 @json_option
 def command(json_file):
-    """The catalogue: what real robots do beyond the nominal model, each with its equation and its parameters.
+    """Print the catalogue: what real robots do beyond the nominal model, with equations and parameters.
 
-    Neutral is the value at which an effect does nothing; its range is what real robots show.
+    "Neutral" is the value at which an effect does nothing. "Range" is what real robots show.
 
     Example: jaxident effects --json catalogue.json
     """

@@ -15,10 +15,14 @@ OUTPUTS = (*(f"real_{number}.csv" for number in range(1, 7)), ".answer.json")
 
 @click.command("example", cls=Recorded)
 @click.option("--out", default="example", show_default=True, metavar="DIR", help="The folder to write.")
-@click.option("--effect", metavar="NAME", help="Of the catalogue (`jaxident effects`), or `none`; else drawn.")
+@click.option(
+    "--effect",
+    metavar="NAME",
+    help="An effect of the catalogue (`jaxident effects`), or `none`. Without it one is drawn.",
+)
 @seed_option
 def command(out, effect, seed):
-    """Small example logs of a simulated robot: six runs of 1000 rows with camera noise.
+    """Write small example logs of a simulated robot: six runs of 1000 rows with camera noise.
 
     The robot is drawn near the published one, and so is the size of the effect that it has beyond the nominal model;
     what they were is kept in DIR/.answer.json, a model file.

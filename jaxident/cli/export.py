@@ -14,21 +14,29 @@ POSITIVE = click.FloatRange(0, min_open=True)
 
 @click.command("export", cls=Recorded)
 @click.argument("model")
-@click.option("--to", "target", required=True, type=click.Choice(TARGETS), help="Simulator, controller or program.")
-@click.option("--out", required=True, metavar="PATH", help="The file to write, its wrapper beside it.")
-@click.option("--wheel-radius", type=POSITIVE, metavar="M", help="Of the robot's wheels (no path depends on it).")
-@click.option("--track", type=POSITIVE, metavar="M", help="Measured on the robot, beside the one at which it moves.")
-@click.option("--mass", type=POSITIVE, metavar="KG", help="Of the robot (no path depends on it).")
-@click.option("--limit", type=POSITIVE, metavar="UMAX", help="Largest command: gives limits of speed and acceleration.")
+@click.option(
+    "--to", "target", required=True, type=click.Choice(TARGETS), help="For which simulator, controller or program."
+)
+@click.option("--out", required=True, metavar="PATH", help="The file to write. The wrapper is written beside it.")
+@click.option("--wheel-radius", type=POSITIVE, metavar="M", help="Radius of the wheels. No path depends on it.")
+@click.option("--track", type=POSITIVE, metavar="M", help="Distance between the wheels, measured on the robot.")
+@click.option("--mass", type=POSITIVE, metavar="KG", help="Mass of the robot. No path depends on it.")
+@click.option(
+    "--limit", type=POSITIVE, metavar="UMAX", help="Largest command. Limits of speed and acceleration follow from it."
+)
 @click.option("--command-unit", type=click.Choice(UNITS), default=UNITS[0], show_default=True,
-              help="What commands of the logs are: a unit of your own, or speeds of the wheels.")  # fmt: skip
-@click.option("--diagnosis", metavar="FILE", help="A diagnosis.json: what effects are worth (default: beside MODEL).")
+              help="Unit of the commands in the logs: one of your own, or speeds of the wheels.")  # fmt: skip
+@click.option(
+    "--diagnosis",
+    metavar="FILE",
+    help="A diagnosis.json that tells what each effect is worth (default: the one beside MODEL).",
+)
 @json_option
 def command(model, target, out, wheel_radius, track, mass, limit, command_unit, diagnosis, json_file):
-    """MODEL (a model file or `published`) in the words of a simulator, a controller, or a program.
+    """Write MODEL (a model file or `published`) as input for a simulator, a controller or a program.
 
-    Says of each part of the model whether a field carries it, the wrapper around the commands, or neither, and how many
-    millimetres 1 s ahead that costs.
+    For each part of the model it says who carries it: a field of the target, a wrapper around the commands, or nobody.
+    If nobody does, it says how many millimetres that costs 1 s ahead.
 
     Example: jaxident export diagnosis/corrected_model.json --to mjcf --out robot.xml
     """

@@ -52,39 +52,45 @@ BOTH_SENSORS = (
     type=click.Choice(["white", "ar1", "slip", "slip-ar1", "auto"]),
     default="auto",
     show_default=True,
-    help="What is random: white camera error, one with a memory, slip of the wheels; auto tries them in turn while the "
-    "residuals are coloured.",
+    help="What is random: white camera error, camera error with a memory (ar1), slip of the wheels, or both. auto "
+    "begins with white and tries the others if its residuals are not white.",
 )
-@click.option("--setup-time", type=above_zero, metavar="S", help="Seconds for the start values (paper).")
-@click.option("--forgetting", type=Number(), metavar="F", help="In (0, 1]; 1, the default, forgets nothing.")
-@click.option("--coupling", is_flag=True, help="Let the two speeds drive each other: two more parameters.")
+@click.option(
+    "--setup-time", type=above_zero, metavar="S", help="Method paper: seconds from which the start values come."
+)
+@click.option(
+    "--forgetting", type=Number(), metavar="F", help="Method paper: in (0, 1]. 1, the default, forgets nothing."
+)
+@click.option("--coupling", is_flag=True, help="Let speed and turn rate act on each other: two more parameters.")
 @click.option("--d-max", type=Number(), metavar="D", help="Largest dead zone (default: 0.9 of the largest command).")
 @click.option(
     "--reading",
     type=click.Choice(["free-run", "one-step"]),
-    help="How the cost of the start values reads the paper's (21); one-step by default (paper).",
+    help="Method paper: how to read equation (21), the cost of the start values (default: one-step).",
 )
 @click.option(
     "--bootstrap",
     "count",
     type=click.IntRange(1, MOST_REFITS),
     metavar="N",
-    help="Also intervals from N refits to resampled residuals; 200 do.",
+    help="Also give intervals from N refits to resampled data. 200 are enough.",
 )
 @click.option(
     "--resample",
     type=click.Choice(["blocks", "runs"]),
     default="blocks",
     show_default=True,
-    help="What --bootstrap draws: blocks of residuals, or whole runs, of which it takes many.",
+    help="What --bootstrap draws: blocks of residuals, or whole runs. The latter needs many runs.",
 )
 @columns_option
 @seed_option
 @click.option("--out", metavar="MODEL", help="The model file to write.")
-@click.option("--report", metavar="FILE", help="A page (.html): intervals, verdicts, doubts, residuals, pictures.")
+@click.option(
+    "--report", metavar="FILE", help="Also write a page (.html) with intervals, warnings, residuals and pictures."
+)
 @json_option
 def command(logs, columns, method, reading, count, resample, seed, out, report, json_file, **settings):
-    """The model behind one or several logs (files, folders, or `-`), runs in the order given.
+    """Find the model behind logs: files, folders, or `-` for standard input. Runs are taken in the order given.
 
     Example: jaxident identify log.csv --out model.json
     """

@@ -12,19 +12,19 @@ import click
 from jaxident.cli.output import Lasting
 
 COMMANDS = {
-    "reproduce": "The paper's robot, excitation and method, beside its published table.",
+    "reproduce": "Repeat the paper's experiment beside its published table.",
     "example": "Write small example logs of a simulated robot.",
-    "simulate": "Synthetic logs from a model.",
-    "effects": "The catalogue of what real robots do beyond the model.",
-    "convert": "Two streams, commands and poses, to one log; or a log to a better one.",
-    "identify": "The model behind one or several logs.",
-    "predict": "Free-run prediction of a log by a model.",
-    "diagnose": "The sim-to-real gap: where it lies, which effect causes it, how far it shrinks.",
+    "simulate": "Simulate logs of a model.",
+    "effects": "Print the catalogue of what real robots do beyond the model.",
+    "convert": "Make one log of commands and poses, or mend a log.",
+    "identify": "Find the model behind one or several logs.",
+    "predict": "Predict the poses of a log by a model.",
+    "diagnose": "Find the sim-to-real gap, which effects cause it, and how far it shrinks.",
     "rerun": "Make a result again from what it says of itself, and compare.",
-    "export": "The model in the words of a simulator, a controller or a program.",
-    "plan": "The next input: the one that best separates two effects.",
-    "sweep": "A Monte-Carlo study: statistics over seeds, excitations, noise levels, robots, estimators.",
-    "bench": "How fast the pipeline is on this machine.",
+    "export": "Write a model for a simulator, a controller or a program.",
+    "plan": "Design the next run: the one that best tells two effects apart.",
+    "sweep": "Run a Monte-Carlo study over seeds, inputs, noise, robots and estimators.",
+    "bench": "Measure how fast this machine is.",
 }
 
 
@@ -54,9 +54,9 @@ class LazyGroup(click.Group):
 @click.command(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(package_name="jaxident", message="%(prog)s %(version)s")
 def program() -> None:
-    """What is the model of a differential-drive robot, how sure are we, and what does the model miss?
+    """Find the model of a differential-drive robot from motor commands and camera poses, and what the model misses.
 
-    From motor commands and camera poses. Example: `jaxident reproduce`, then `jaxident identify --help`.
+    Begin with `jaxident example`, then `jaxident identify example`.
     """
 
 

@@ -32,10 +32,11 @@ PLAIN = 9.0
 @seed_option
 @json_option
 def command(model, between, samples, limit, out, seed, json_file):
-    """The next input to record: the one that best separates two effects on the robot of MODEL, from rest.
+    """Design the next run: the commands that best tell two effects apart on the robot of MODEL, from rest.
 
-    The separation is how much likelier the right effect makes the data than the other one, both refitted: the
-    difference of the logarithms, to first order. An effect has the size that MODEL gives it, else a typical one.
+    The "separation" that it prints says how much more likely the data are under the right effect than under the other
+    one, when both are refitted. It is a difference of log-likelihoods, computed to first order. An effect has the size
+    that MODEL gives it, or else a typical one.
 
     Example: jaxident plan model.json --between transport_delay,motor_lag --limit 0.8 --out next.csv
     """

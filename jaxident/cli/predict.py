@@ -12,18 +12,29 @@ from jaxident.start import start_jax
 @click.command("predict", cls=Recorded)
 @click.argument("model")
 @click.argument("log")
-@click.option("--horizon", type=rows_option, required=True, metavar="N", help="Rows of each free run.")
-@click.option("--burn-in", type=rows_option, default=20, show_default=True, metavar="M", help="Rows before it.")
-@click.option("--stride", type=rows_option, metavar="S", help="Rows between starts (default: the horizon).")
+@click.option(
+    "--horizon", type=rows_option, required=True, metavar="N", help="How many rows each prediction runs ahead."
+)
+@click.option(
+    "--burn-in",
+    type=rows_option,
+    default=20,
+    show_default=True,
+    metavar="M",
+    help="Rows before a start that its state is estimated from.",
+)
+@click.option("--stride", type=rows_option, metavar="S", help="Rows from one start to the next (default: the horizon).")
 @click.option("--from", "first", type=Number(), metavar="T", help="Use the rows from this time [s] on.")
 @click.option("--to", "last", type=Number(), metavar="T", help="Use the rows up to this time [s].")
 @click.option("--session-time", type=Number(), metavar="S", help="Session time [s] at the first row of LOG, for "
-              "effects that drift (default: as the model's provenance says).")  # fmt: skip
+              "effects that drift (default: what the model file says of its logs).")  # fmt: skip
 @click.option("--out", required=True, metavar="CSV", help="The predictions to write (.csv or .csv.gz).")
 @columns_option
 @json_option
 def command(model, log, horizon, burn_in, stride, first, last, session_time, out, columns, json_file):
-    """Free runs of MODEL over LOG, each start state estimated from the rows before it alone.
+    """Let MODEL run ahead over the commands of LOG, from many places.
+
+    Each start state is estimated only from the rows before it.
 
     Example: jaxident predict model.json log.csv --horizon 100 --out predicted.csv
     """

@@ -14,14 +14,20 @@ TABLE = "table.json"
 
 @click.command("reproduce", cls=Recorded)
 @click.option("--out", default="reproduction", show_default=True, metavar="DIR", help="The folder to write.")
-@click.option("--seeds", type=click.IntRange(2), default=200, show_default=True, help="Noisy copies at each level.")
+@click.option(
+    "--seeds",
+    type=click.IntRange(2),
+    default=200,
+    show_default=True,
+    help="How many noisy logs are drawn at each noise level.",
+)
 @seed_option
 @json_option
 def command(out, seeds, seed, json_file):
-    """The paper's robot, its excitation and its method, beside its published table.
+    """Repeat the paper's experiment and put the result beside the published table.
 
-    Writes DIR/table.json, the paper's figures 4, 7, 8 and 9, the error of every estimator against camera noise, and
-    DIR/index.html with all of it.
+    It writes DIR/table.json, the paper's figures 4, 7, 8 and 9, a figure of each estimator's error against camera
+    noise, and DIR/index.html with all of them.
 
     Example: jaxident reproduce --out reproduction
     """

@@ -38,14 +38,15 @@ LISTED = 20
 
 @click.command("rerun")
 @click.argument("file", metavar="FILE")
-@click.option("--data", "folders", multiple=True, metavar="FOLDER", help="Where inputs now lie (repeatable); after it "
-              "they are looked for here, beside FILE, and one folder further.")  # fmt: skip
+@click.option("--data", "folders", multiple=True, metavar="FOLDER", help="Where the inputs lie now (repeatable). "
+              "They are also looked for in this folder, beside FILE, in the folders there, and one above.")  # fmt: skip
 @click.option("--out", metavar="DIR", help="Keep the new outputs in this folder; without it they are only compared.")
 @json_option
 def command(file, folders, out, json_file):
-    """Make FILE again and compare: diagnosis.json, a model, a result of --json, predictions, a log or an export.
+    """Make FILE again from what it says of itself, and compare.
 
-    The inputs must be what they were: their SHA-256 is checked. Exit code 0 if every value is the same, 1 if not.
+    FILE is a diagnosis.json, a model, a result of --json, predictions, a log or an export. The inputs must not have
+    changed: their SHA-256 is checked. The exit code is 0 if every value is the same, and 1 if not.
 
     Example: jaxident rerun diagnosis/diagnosis.json --data logs
     """

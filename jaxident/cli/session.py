@@ -25,6 +25,10 @@ class Number(click.FloatRange):
             self.fail(f"{value!r} is not a finite number", param, ctx)
         return number
 
+    def _describe_range(self):
+        """The range in --help: nothing where there is none, for which click writes `x<=None`."""
+        return "" if self.min is None and self.max is None else super()._describe_range()
+
 
 above_zero = Number(0, min_open=True)
 not_negative = Number(0)
@@ -92,7 +96,9 @@ class EffectOption(click.ParamType):
         return name.strip(), parameters
 
 
-effect_option = click.option("--effect", "effects", type=EffectOption(), multiple=True, help="Repeatable.")
+effect_option = click.option(
+    "--effect", "effects", type=EffectOption(), multiple=True, help="An effect to add (repeatable)."
+)
 
 
 def check_outputs(*paths: str | None) -> None:

@@ -38,24 +38,28 @@ class Noise(click.ParamType):
 @click.command("simulate", cls=Recorded)
 @click.argument("model")
 @click.option("--inputs", metavar="LOG", help="Take times and commands from this log (`-`: standard input).")
-@click.option("--excitation", type=click.Choice(EXCITATION_NAMES), help="Make the commands instead.")
+@click.option("--excitation", type=click.Choice(EXCITATION_NAMES), help="Make commands of this kind instead.")
 @click.option("--samples", type=click.IntRange(2, MOST_ROWS), help="Length of the excitation, in rows.")
 @click.option("--amplitude", type=above_zero, default=1.0, show_default=True)
-@click.option("--hold", type=rows_option, default=20, show_default=True, help="Samples that a level lasts.")
+@click.option("--hold", type=rows_option, default=20, show_default=True, help="How many samples each level lasts.")
 @effect_option
-@click.option("--noise", type=Noise(), help="Camera noise in metres and radians; without it the log is noise-free.")
-@click.option("--wheel-noise", type=not_negative, metavar="SD", help="Wheel speeds too, with white noise [rad/s].")
-@click.option("--wheel-radius", type=above_zero, metavar="R", help="Of the wheels [m] (default: as the model says).")
-@click.option("--wheel-track", type=above_zero, metavar="W", help="Between the wheels [m] (default: as the model says, "
-              "or as its gains do).")  # fmt: skip
+@click.option("--noise", type=Noise(), help="Camera noise [m], [rad]. Without it the log has no noise.")
+@click.option(
+    "--wheel-noise", type=not_negative, metavar="SD", help="Also write wheel speeds, with this white noise [rad/s]."
+)
+@click.option(
+    "--wheel-radius", type=above_zero, metavar="R", help="Radius of the wheels [m] (default: what the model says)."
+)
+@click.option("--wheel-track", type=above_zero, metavar="W", help="Distance between the wheels [m] (default: what "
+              "the model says, or what follows from its gains).")  # fmt: skip
 @click.option("--out", required=True, metavar="LOG", help="The log to write (.csv or .csv.gz).")
 @seed_option
 def command(model, inputs, excitation, samples, amplitude, hold, effects, noise, out, seed, **wheels):
-    """A synthetic log of MODEL, a model file or `published`.
+    """Simulate a log of MODEL, a model file or `published`.
 
-    Random slip and the noise's correlation time come from the model file, and count only with --noise. Effects join
-    those of the model file, in whose place they stand where both have one; `jaxident effects` lists them. A model with
-    `wheels` gives exact wheel speeds unless --wheel-noise is given.
+    Random slip and the correlation time of the noise come from the model file. They count only with --noise. Each
+    --effect is added to the effects of the model file and replaces one of the same name; `jaxident effects` lists all.
+    A model with `wheels` also gives wheel speeds, without noise unless --wheel-noise is given.
 
     Example: jaxident simulate published --excitation staircase --samples 2000 --noise 0.001,0.01
     --effect transport_delay:delay=0.05 --out log.csv

@@ -12,16 +12,16 @@ from jaxident.start import start_jax
 
 @click.command("sweep", cls=Recorded)
 @click.argument("study", metavar="STUDY.toml", required=False)
-@click.option("--out", metavar="DIR", help="Folder of the results; a second call goes on where the first stopped.")
+@click.option("--out", metavar="DIR", help="Folder of the results. A second call goes on where the first stopped.")
 @click.option("--scheduler", metavar="ADDRESS|local:N", help="Compute with Dask: a scheduler, or N local processes.")
 @click.option("--trial", type=click.IntRange(0), metavar="K", help="Run trial K alone; its picture and log go to DIR.")
 @click.option("--example", is_flag=True, help="Print a commented study that runs in about 20 s.")
 @seed_option
 def command(study, out, scheduler, trial, example, seed):
-    """A Monte-Carlo study: every combination of the file's axes, many seeds, statistics that can be quoted.
+    """Run a Monte-Carlo study: every combination of the file's axes, with many seeds.
 
-    Writes DIR/trials.zarr (every trial; opens with xarray.open_zarr), DIR/summary.csv and DIR/index.html. Killed at
-    any moment, the same command goes on and ends with the same numbers.
+    It writes DIR/trials.zarr (every trial; xarray.open_zarr opens it), DIR/summary.csv with bias, error and coverage,
+    and DIR/index.html. If it is stopped at any moment, the same command goes on and ends with the same numbers.
 
     Example: jaxident sweep --example > study.toml, then jaxident sweep study.toml --out study
     """
