@@ -46,6 +46,7 @@ def test_identify_writes_a_model_that_is_right(folder):
     assert len(result["parameters"]) == 12
 
 
+@pytest.mark.slow
 def test_identify_bootstraps_with_a_seed(folder):
     log = read_log(folder / "log.csv")
     rows = zip(*(column[:120] for column in (log.t, log.u_r, log.u_l, log.x, log.y, log.theta)), strict=True)

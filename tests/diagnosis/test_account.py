@@ -133,6 +133,7 @@ def test_the_floor_is_what_a_true_model_misses_by(kind):
     assert set(floor.chance) == {effect.name for effect in effects}
 
 
+@pytest.mark.slow
 def test_a_memory_of_the_camera_is_told_with_what_it_does_to_starts():
     """The same robots with and without it: its part is the difference, within the error of both mean squares."""
     law = Law(5e-4, 4e-3, coloured=(1e-3, 5e-3), coloured_time=0.3)

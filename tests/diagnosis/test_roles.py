@@ -101,6 +101,7 @@ def test_judging_runs_only_report(logs):
     np.testing.assert_array_equal(one[0].log.u_r, join(logs).u_r)  # judged under the commands that were sent
 
 
+@pytest.mark.slow
 def test_sizes_of_outliers_come_out_in_the_model(logs):
     """About 15 of them: a root mean square of so few has a standard error of 13 % in position, of 18 % in heading."""
     _, _, direct = found(logs)

@@ -42,6 +42,7 @@ LAWS = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: f"{law[0]} by {law[2]}")
 def test_a_robot_with_a_law_is_predicted_by_its_own_model_alone(law):
     """The full integrator drives, the fast one predicts; without the law the prediction is at least ten times worse."""

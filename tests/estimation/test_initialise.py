@@ -82,6 +82,7 @@ def linear_start(observations):
     )
 
 
+@pytest.mark.slow
 def test_never_above_nelder_mead(reading):
     name, run = reading
     assert compare_with_nelder_mead(name, run, range(8), 1500).max() < 1e-6

@@ -156,6 +156,7 @@ def errors_over_bound(keys, name="multilevel", noise=NOISE, setup=None):
     return map(np.asarray, jax.jit(jax.vmap(one))(keys))
 
 
+@pytest.mark.slow
 def test_errors_at_the_end_are_near_the_bound():
     """32 trials from a prior 2 % off, which tells next to nothing: each RMS is within 1 +- 3 / sqrt(2 * 32) of the
     efficient one; 1.5 is the goal."""
@@ -176,6 +177,7 @@ def test_every_cell_is_near_the_bound_from_its_own_start(name, millimetres):
     assert np.sqrt(np.mean(errors[sound] ** 2, axis=0)).max() < 1.5
 
 
+@pytest.mark.slow
 def test_a_setup_that_leaves_a_parameter_open_is_not_sound():
     """Of the left wheel's levels only 0.3 passes its dead zone of 0.2: any dead zone below has a gain that fits."""
     levels = jnp.array([0.0, 0.5, -0.7, 0.3, 1.0]), jnp.array([0.1, 0.3, -0.3, 0.3, 0.0])

@@ -86,6 +86,7 @@ def test_errors_stay_near_the_bound_and_intervals_cover():
     assert np.mean(np.abs(over_own[:, :8]) < 1.96) > 0.89
 
 
+@pytest.mark.slow
 def test_a_dead_zone_on_a_level_of_the_input_is_arrived_at():
     """The left wheel's dead zone lies on a level of the staircase, where the cost has a kink: damped like all others it
     does not arrive in 100 steps in 6 of these 48 trials, and with an easier damping took 44 to 58."""
@@ -95,6 +96,7 @@ def test_a_dead_zone_on_a_level_of_the_input_is_arrived_at():
     assert np.mean(np.abs(over_own[:, 7]) < 1.96) > 0.8
 
 
+@pytest.mark.slow
 def test_a_short_run_ends_in_the_right_valley():
     """Four of 400 runs of 200 rows in which the first grid's best point leads into another one."""
     over_bound, _, ok, _ = trials("multilevel", Noise(2e-4, 2e-3), Law(), 400, 200, jnp.array([40, 227, 311, 398]))

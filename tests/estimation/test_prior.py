@@ -87,6 +87,7 @@ def test_prior_changes_nothing_where_poses_speak():
     assert share.max() < 1e-4
 
 
+@pytest.mark.slow
 def test_a_robot_that_never_leaves_its_dead_zones_comes_from_the_prior():
     """Its gains and dead zones are the prior's, finite and a robot's, whatever the camera's noise looks like."""
     fit = FIT(runs_of(jax.random.key(1), Wheels(jnp.full(200, 0.1), jnp.full(200, 0.1))))
@@ -107,6 +108,7 @@ def test_one_constant_command_ends_finite():
     assert np.abs(np.array(fit.robot.drive.gain)).max() < 1e3
 
 
+@pytest.mark.slow
 def test_what_a_straight_log_does_not_tell_is_named():
     """Two levels, both wheels alike: the wheels' shares in either speed are the prior's, and no interval the log's."""
     found = identify(straight(), noise_law="white")
@@ -180,6 +182,7 @@ def test_what_data_say_of_a_held_rate_is_struck_out():
     assert share[0] > MOSTLY
 
 
+@pytest.mark.slow
 def test_batch_is_the_loop():
     """Also where the prior decides: commands in the dead zone."""
     command = Wheels(jnp.full(100, 0.1), jnp.full(100, 0.1))
@@ -212,6 +215,7 @@ def windows(count=60, rows=30, period=0.1):
     return join(logs), gain
 
 
+@pytest.mark.slow
 def test_a_robot_that_coasts_through_short_runs_is_not_believed():
     """The poses alone want it at 0.02 1/s; held at the prior's rate, the steady speeds are those commanded."""
     log, gain = windows()

@@ -60,6 +60,7 @@ def driven(seed, rho, rows=600):
     return log._replace(wheel_r=log.wheel_r + error[0], wheel_l=log.wheel_l + error[1])
 
 
+@pytest.mark.slow
 def test_errors_that_hang_together_widen_intervals_and_are_told():
     plain, coloured = (ji.identify(driven(3, rho), noise_law="white") for rho in (0.0, 0.9))
     assert not any("wheel speed in" in line for line in plain.suspicions)

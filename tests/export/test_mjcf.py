@@ -13,6 +13,7 @@ from jaxident.effects.apply import with_effects
 from jaxident.robot.drive import Physical
 
 
+@pytest.mark.slow
 def test_an_identified_robot_in_mujoco_is_as_near_to_the_truth_as_its_model():
     own, exported = identified()
     assert 0.05 < own < 5.0  # [mm] 1 s ahead

@@ -82,6 +82,7 @@ def test_a_sweep_that_was_ended_goes_on(tmp_path, finished, counted, count):
     assert not list(tmp_path.glob(".part-*"))
 
 
+@pytest.mark.slow
 def test_a_sweep_over_effects_goes_on(tmp_path, counted):
     sweep(UNDER_EFFECTS, tmp_path / "whole")
     with pytest.raises(Killed):

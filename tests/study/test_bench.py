@@ -26,6 +26,7 @@ def small(monkeypatch):
         monkeypatch.setattr(bench, name, value)
 
 
+@pytest.mark.slow
 def test_whole_trials_end_near_the_robot(small):
     estimate, ok = jax.jit(jax.vmap(lambda key: bench.trial(ROBOT, key)))(jax.random.split(jax.random.key(0), 2))
     assert np.all(ok)

@@ -17,6 +17,7 @@ def log():
     return paper_log(ROBOT, jax.random.key(0))
 
 
+@pytest.mark.slow
 def test_noise_study_repeats_and_grows_with_the_noise(log, monkeypatch):
     monkeypatch.setattr(reproduction, "BLOCK", 4)
     arrays = jax.tree.map(lambda column: jnp.asarray(column[:600]), log)
@@ -27,6 +28,7 @@ def test_noise_study_repeats_and_grows_with_the_noise(log, monkeypatch):
     assert np.all(deviation[1, :, :2] > 10.0 * deviation[0, :, :2])
 
 
+@pytest.mark.slow
 def test_ageing_is_followed(log):
     """With a memory of 100 samples the lag behind a ramp is 100 / 2000 of it: 1 % of the gain, 0.005 of the width."""
     gain, width = drift_study(ROBOT, log)
