@@ -1,19 +1,26 @@
 """Wheel speeds in a diagnosis: rims against differences of the simulator, the joint likelihood, logs without them."""
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
+import jaxident as ji
+from jaxident.diagnosis.causes.finding import find_effects
 from jaxident.diagnosis.causes.refit import Data, refit
 from jaxident.diagnosis.motion.linear import follow, linearise
 from jaxident.diagnosis.motion.paths import track
 from jaxident.diagnosis.motion.rims import rim_speeds, rims_of, sized_noise, white_noise
 from jaxident.diagnosis.motion.windows import cut
 from jaxident.diagnosis.noise.law import Law, white_whitener
+from jaxident.diagnosis.prepare import prepare, suspected_wheels
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.coordinates import COORDINATES, PLACES, STEPPED, sizes
 from jaxident.log import join, make_log
+from jaxident.robot.noise import Noise
+from jaxident.robot.wheel_sensor import WheelSensor
 from tests.support.small_robot import ROWS, RUNS, STEP, VECTOR, robot_with
 
 LAW, RADIUS, TRACK, NOISE = Law(2e-4, 2e-3), 0.03, 0.2, 0.02
@@ -148,3 +155,19 @@ def test_logs_without_the_columns_have_no_rims():
     linear = linearise(VECTOR, first_starts(windows), windows, [0])
     assert linear.rims is None
     assert Data(windows, None).of_rims(linear.rims, residual=True) is None
+
+
+def test_a_search_uses_wheel_speeds_and_sets_those_aside_that_contradict_the_poses():
+    robot = dataclasses.replace(ji.load_model("published"), effects=(ji.Effect("motor_lag", {"time_constant": 0.08}),),
+                                noise=Noise(0.001, 0.005), wheels=WheelSensor(0.03, 0.1, 0.1))  # fmt: skip
+    key = jax.random.key(2)
+    log = ji.simulate(robot, ji.excite(key, "multilevel", 900, robot.sample_period), key=key)
+    log = type(log)(*(None if column is None else np.asarray(column) for column in log))
+    prepared = prepare(log, None)
+    _, finding = find_effects(prepared)
+    assert finding.selected == ("motor_lag",)
+    assert finding.data.rims is not None
+    assert finding.law.wheel == pytest.approx(0.1, rel=0.3)
+    backward = log._replace(wheel_r=-log.wheel_r, wheel_l=-log.wheel_l)
+    assert prepare(backward, None).windows.wheels is None
+    assert "wrong sign" in suspected_wheels(backward)[0]
