@@ -41,14 +41,14 @@ def searched(log):
     return finding.selected, rivals, -max(others, default=0.0)
 
 
-def compare(name: str, seed: int):
+def compare(name: str, seed: int, size: float = 1.0):
     """The search of one robot's log by poses alone, and by both sensors; None for a wheel that is not simulated."""
     nominal = ji.load_model("published")
     if CATALOGUE[name].stage == "grip":
         return None
     key = jax.random.key(seed)
     inputs = ji.excite(key, "multilevel", ROWS, nominal.sample_period)
-    effects, noise = (ji.Effect(name, CASES[name]),), Noise(0.001, 0.005)
+    effects, noise = (ji.Effect(name, {key: size * value for key, value in CASES[name].items()}),), Noise(0.001, 0.005)
     robot = dataclasses.replace(nominal, effects=effects, noise=noise, wheels=SENSOR)
     log = ji.simulate(robot, inputs, key=jax.random.fold_in(key, 1))
     log = type(log)(*(None if column is None else jax.device_get(column) for column in log))
@@ -63,13 +63,14 @@ def right(name: str, found) -> bool:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=2)
+    parser.add_argument("--size", type=float, default=1.0, help="times the sizes of CASES")
     parser.add_argument("--effects", default=",".join(CASES))
     options = parser.parse_args()
     ji.start_jax()
     rows = []
     for name in options.effects.split(","):
         for seed in range(options.seeds):
-            found = compare(name, seed)
+            found = compare(name, seed, options.size)
             if found is None:
                 continue
             rows.append((name, *found))
