@@ -57,7 +57,8 @@ def command(logs, columns, sim, model, horizon, out, seed):
     Example: jaxident diagnose run_1.csv run_2.csv run_3.csv --out diagnosis
     """
     start_jax()
-    from jaxident.diagnosis.diagnose import diagnose, unused_wheels
+    from jaxident.diagnosis.diagnose import diagnose
+    from jaxident.diagnosis.prepare import suspected_wheels
     from jaxident.estimation.suspicions import log_suspicions
     from jaxident.files.atomic import make_folder
     from jaxident.files.diagnosis import diagnosis_to_dict
@@ -70,7 +71,7 @@ def command(logs, columns, sim, model, horizon, out, seed):
     records, simulated = read_logs(logs, columns), find_logs(sim) if sim else find_simulated(logs)
     theirs = [read_log(path) for path in simulated]
     nominal = load_model(model) if model else None
-    warn((*log_suspicions(join(records)), *unused_wheels(records)), columns)
+    warn((*log_suspicions(join(records)), *suspected_wheels(join(records))), columns)
     warn(f"the simulator's logs: {line}" for line in (log_suspicions(join(theirs)) if theirs else ()))
     make_folder(out)  # what cannot be written is told before the work, not after it
     check_outputs(*(os.path.join(out, name) for name in OUTPUTS))

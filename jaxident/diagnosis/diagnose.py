@@ -14,7 +14,7 @@ from jaxident.diagnosis.account.shrink import Shrink
 from jaxident.diagnosis.account.where import Place
 from jaxident.diagnosis.causes.direct import direct_effects, direct_evidence, present
 from jaxident.diagnosis.causes.finding import CLAIMED, Finding, find_effects
-from jaxident.diagnosis.prepare import Prepared, prepare
+from jaxident.diagnosis.prepare import Prepared, prepare, suspected_wheels
 from jaxident.diagnosis.replay import Replay, answers, replay, visible
 from jaxident.diagnosis.simulator import Simulator, as_simulator, check_units, inspect_simulator, shared
 from jaxident.diagnosis.translate import to_model
@@ -39,11 +39,6 @@ class Parameter(NamedTuple):
     nominal: float | None
     refitted: float
     standard_deviation: float
-
-
-UNUSED_WHEELS = (
-    "wheel speeds are not used: a diagnosis judges by the poses alone so far; `jaxident identify` uses both sensors"
-)
 
 
 class Diagnosis(NamedTuple):
@@ -117,12 +112,7 @@ def diagnose(
     nominal = to_model(prepared, finding.nominal.vector, finding.law, (), None, finding.nominal)
     return Diagnosis(verdict, judgement, gap, account, where, selected, parameters, visible(known), replay(known, seed),
                      advice(verdict, judgement, laws), nominal, corrected, shrinks, prepared, finding, surplus,
-                     simulator, laws, (*log_suspicions(join(logs)), *unused_wheels(logs)))  # fmt: skip
-
-
-def unused_wheels(logs: Log | Sequence[Log]) -> tuple[str, ...]:
-    """A line for logs with wheel speeds, which a diagnosis does not use yet."""
-    return () if join(logs).wheel_r is None else (UNUSED_WHEELS,)
+                     simulator, laws, (*log_suspicions(join(logs)), *suspected_wheels(join(logs))))  # fmt: skip
 
 
 def check_nominal(logs: Log | Sequence[Log], sim: Log | Sequence[Log] | None, model: Model | None) -> None:

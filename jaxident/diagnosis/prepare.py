@@ -24,6 +24,7 @@ from jaxident.errors import InputError
 from jaxident.estimation.checks import check_informative
 from jaxident.estimation.observations import blind, poses_only
 from jaxident.estimation.stretches import Starts
+from jaxident.estimation.wheel_suspicions import check_wheels
 from jaxident.log import Log, join, run_begins
 
 BURN = 20
@@ -78,7 +79,8 @@ def prepare(
     given = join(logs)
     check_informative(given)
     largest = float(np.nanmax(np.abs(np.stack(given.command)))) if like is None else like.largest
-    log = poses_only(given)._replace(u_r=np.asarray(given.u_r) / largest, u_l=np.asarray(given.u_l) / largest)
+    log = used(given) if like is None else poses_only(given)
+    log = log._replace(u_r=np.asarray(given.u_r) / largest, u_l=np.asarray(given.u_l) / largest)
     period = float(np.median(np.concatenate([np.diff(run.t) for run in log.runs()])))
     rows, horizon = horizon_rows(horizon, period)
     roles = split(log, BURN + rows)
@@ -100,6 +102,16 @@ def prepare(
     return found._replace(
         windows=windows, frames=frames_of(fitted, frozen, outlying), nominal=lower_valley(first, windows)
     )
+
+
+def used(log: Log) -> Log:
+    """A log without wheel speeds that contradict its poses."""
+    return log if log.wheel_r is None or check_wheels(log).usable else poses_only(log)
+
+
+def suspected_wheels(log: Log) -> tuple[str, ...]:
+    """What wheel speeds say against themselves or the poses, a line each; none of a log without."""
+    return () if log.wheel_r is None else check_wheels(log).lines
 
 
 def repaired(prepared: Prepared, lost: Lost) -> Prepared:

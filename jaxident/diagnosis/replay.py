@@ -11,7 +11,7 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.columns import AMPLITUDE
 from jaxident.diagnosis.causes.evidence import CHANCE
-from jaxident.diagnosis.causes.points import differences, seeded, sizes_of
+from jaxident.diagnosis.causes.points import differences, rim_differences, seeded, sizes_of
 from jaxident.diagnosis.causes.refit import Data, Solution
 from jaxident.diagnosis.motion.linear import gram, linearise, normal
 from jaxident.effects.catalogue import CATALOGUE
@@ -54,7 +54,11 @@ def answers(data: Data, nominal: Solution, largest: float) -> Answers:
     usual = {name: _typical(name, largest, duration) for name in COORDINATES}
     change = differences(data, nominal, [seeded(nominal.vector, name, size) for name, size in usual.items()])
     columns = np.concatenate([linear.slopes, change], axis=2)
-    products = gram(data.whitener, columns, linear.starts).products.sum(axis=0)
+    more = None
+    if data.rims is not None:
+        far = rim_differences(data, nominal, [seeded(nominal.vector, name, size) for name, size in usual.items()])
+        more = data.of_rims(linear.rims, linear.rims.slopes, far)
+    products = gram(data.whitener, columns, linear.starts, more).products.sum(axis=0)
     order = {place: k for k, place in enumerate(places)}
     typical = {name: len(places) + k for k, name in enumerate(COORDINATES)}
     own = {name: [order[p] for p in smooth[name]] if name in smooth else [typical[name]] for name in COORDINATES}

@@ -14,7 +14,7 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.alike import with_prior
-from jaxident.diagnosis.causes.points import differences, points_of, seeded
+from jaxident.diagnosis.causes.points import differences, points_of, rim_differences, seeded
 from jaxident.diagnosis.causes.refit import Data, Solution
 from jaxident.diagnosis.motion.linear import Linear, gram, linearise, normal
 from jaxident.effects.coordinates import (
@@ -106,7 +106,8 @@ def tabulate(
     more = np.zeros((*linear.residual.shape, 0)) if rest is None else rest
     base = np.concatenate([linear.slopes[..., : len(NOMINAL)], more], axis=2)
     whole = np.concatenate([base, answers, linear.residual[..., None]], axis=2)
-    products = gram(data.whitener, whole, linear.starts).products
+    more_rows = _rim_rows(data, fit, linear, columns, more.shape[2])
+    products = gram(data.whitener, whole, linear.starts, more_rows).products
     owned = [base.shape[2] + column for name in owners for column in options[here[name]].columns]
     products = _less_owned(products, range(len(NOMINAL), base.shape[2]), owned)
     cross = products[:, :-1, -1] + products[:, :-1, base.shape[2] : -1] @ [column.value for column in columns]
@@ -181,6 +182,22 @@ def _answers(data: Data, fit: Solution, columns: list[_Column]) -> tuple[np.ndar
     with np.errstate(over="ignore", invalid="ignore"):
         largest = np.max(np.abs(answers), axis=(0, 1), initial=0.0) * [column.scale for column in columns]
     return np.where(largest < FAR, answers, 0.0), linear  # a robot that runs away answers nothing
+
+
+def _rim_rows(data: Data, fit: Solution, linear: Linear, columns: list[_Column], rest: int) -> np.ndarray | None:
+    """White rows of the rims for the columns of a table; what is in no catalogue moves no rim, as random slip does
+    not."""
+    if data.rims is None:
+        return None
+    own = linear.rims
+    change = rim_differences(data, fit, [column.vector for column in columns if column.place is None])
+    slopes, jumps = iter(np.moveaxis(own.slopes[..., len(NOMINAL) :], -1, 0)), iter(np.moveaxis(change, -1, 0))
+    answers = np.stack([c.sign * next(jumps if c.place is None else slopes) for c in columns], axis=-1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        largest = np.max(np.abs(answers), axis=(0, 1), initial=0.0) * [column.scale for column in columns]
+    answers = np.where(largest < FAR, answers, 0.0)
+    none = np.zeros((*own.residual.shape, rest))
+    return data.of_rims(own, own.slopes[..., : len(NOMINAL)], none, answers, residual=True)
 
 
 def _eliminated(fit: Solution, products: Array, cross: Array, count: int) -> tuple[np.ndarray, np.ndarray]:

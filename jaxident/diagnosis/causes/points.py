@@ -6,6 +6,7 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.causes.refit import Data, Solution, bounds
 from jaxident.diagnosis.causes.steps import likely_steps
 from jaxident.diagnosis.motion.linear import follow, gram, left_over
+from jaxident.diagnosis.motion.rims import rim_speeds
 from jaxident.effects.coordinates import (
     COORDINATES,
     PLACES,
@@ -59,6 +60,15 @@ def differences(data: Data, solution: Solution, vectors: list[np.ndarray]) -> np
     return np.moveaxis(solution.linear.residual[None] - follow(np.stack(vectors), starts, data.windows), 0, -1)
 
 
+def rim_differences(data: Data, solution: Solution, vectors: list[np.ndarray]) -> np.ndarray:
+    """What rims gain, (windows, numbers, vectors), as in `differences`."""
+    base = solution.linear.rims.residual
+    if not vectors:
+        return np.zeros((*base.shape, 0))
+    starts = np.broadcast_to(solution.starts, (len(vectors), *solution.starts.shape))
+    return np.moveaxis(rim_speeds(np.stack(vectors), starts, data.windows) - base, 0, -1)
+
+
 def at_best(data: Data, solution: Solution, pair: tuple[str, str]) -> np.ndarray:
     """The vector of a solution with one coordinate, an instant or a step, where it fits best, all else following
     linearly: -log p has a valley in every window, or jumps wherever a command rounds to another tooth."""
@@ -72,11 +82,21 @@ def at_best(data: Data, solution: Solution, pair: tuple[str, str]) -> np.ndarray
         lanes = np.broadcast_to(solution.starts, (len(vectors), *solution.starts.shape))
         found = np.moveaxis(follow(vectors, lanes, data.windows), 0, -1)
         columns = np.concatenate([solution.linear.slopes, found], axis=2)
-        products = gram(data.whitener, columns, solution.linear.starts).products.sum(axis=0)
+        more = _rim_residuals(data, solution, vectors, lanes)
+        products = gram(data.whitener, columns, solution.linear.starts, more).products.sum(axis=0)
         orders = [[*range(base), base + k] for k in range(len(vectors))]
         left = [left_over(products[np.ix_(order, order)], order[:-1]) for order in orders]
         best = vectors[_middle_of_best(np.array(left))]
     return best
+
+
+def _rim_residuals(data: Data, solution: Solution, vectors: Array, lanes: Array) -> np.ndarray | None:
+    """White rows of rims: a solution's slopes, what each of some vectors leaves, and the start states."""
+    rims, own = data.rims, solution.linear.rims
+    if rims is None:
+        return None
+    left = np.moveaxis(rims.residual(rim_speeds(vectors, lanes, data.windows)), 0, -1)
+    return np.concatenate([rims.white(own.slopes), rims.whitener @ left, rims.white(own.starts)], axis=2)
 
 
 def _middle_of_best(left: Array) -> int:

@@ -7,6 +7,7 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.alike import unlikeliness, with_prior
 from jaxident.diagnosis.motion.linear import Linear, follow, gram, linearise, normal
+from jaxident.diagnosis.motion.rims import Rims, rim_speeds
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.coordinates import NOMINAL, PLACES, REACHED, STEPPED, free_places, limits, neutral_vector
 from jaxident.effects.discovered import Laws
@@ -24,10 +25,19 @@ PARTS = (1.0, 0.25, 0.0)
 
 
 class Data(NamedTuple):
-    """Windows and the whitener of their noise (windows, numbers, numbers)."""
+    """Windows and the whitener of their noise (windows, numbers, numbers); rims: wheel speeds, None without."""
 
     windows: Windows
     whitener: Any
+    rims: Rims | None = None
+
+    def of_rims(self, rims: Linear | None, *columns: Array, residual: bool = False) -> np.ndarray | None:
+        """White rows (windows, rows, n + 5) of some columns of rim speeds, of the residual and of the start states."""
+        if self.rims is None or rims is None:
+            return None
+        own = [self.rims.white(each) for each in columns]
+        own += [self.rims.whitener @ self.rims.residual(rims.residual)[..., None]] if residual else []
+        return np.concatenate([*own, self.rims.white(rims.starts)], axis=2)
 
 
 class Solution(NamedTuple):
@@ -92,7 +102,9 @@ def _around(data: Data, vector: Array, starts: Array, places: list[int]) -> tupl
     """The linearisation there; summed products (n, n) with the prior's, the residual last; and what start states take
     in every window (windows, 5, n)."""
     linear = linearise(vector, starts, data.windows, places)
-    found = gram(data.whitener, np.concatenate([linear.slopes, linear.residual[..., None]], axis=2), linear.starts)
+    more = None if linear.rims is None else data.of_rims(linear.rims, linear.rims.slopes, residual=True)
+    columns = np.concatenate([linear.slopes, linear.residual[..., None]], axis=2)
+    found = gram(data.whitener, columns, linear.starts, more)
     return linear, with_prior(found.products.sum(axis=0), vector), found.solve
 
 
@@ -106,6 +118,9 @@ def best_starts(
     residual = np.ascontiguousarray(np.moveaxis(found, 0, -1))  # the whitener is read once for all of them
     with np.errstate(over="ignore", invalid="ignore"):  # a start may run away
         squares = 0.5 * np.sum((data.whitener @ residual) ** 2, axis=1).T
+        if data.rims is not None:
+            lots = np.tile(vector, (len(lanes), 1))
+            squares = squares + data.rims.squares(rim_speeds(lots, lanes, data.windows, laws))
     squares = np.where(np.isnan(squares), np.inf, squares)
     best = np.argmin(squares, axis=0)
     chosen = np.take_along_axis(lanes, best[None, None], axis=0)[0]
@@ -116,7 +131,9 @@ def _taken(data: Data, linear: Linear) -> float:
     """What start states would still take of the squares."""
     residual = linear.residual
     whole = 0.5 * float(np.sum((data.whitener @ residual[..., None]) ** 2))
-    rest = gram(data.whitener, residual[..., None], linear.starts)
+    if data.rims is not None:
+        whole += float(np.sum(data.rims.squares(linear.rims.residual)))
+    rest = gram(data.whitener, residual[..., None], linear.starts, data.of_rims(linear.rims, residual=True))
     return whole - 0.5 * float(np.sum(rest.products))
 
 

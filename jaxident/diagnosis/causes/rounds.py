@@ -21,6 +21,7 @@ from jaxident.diagnosis.causes.refit import Data, Solution, refit
 from jaxident.diagnosis.causes.search import MOST_EFFECTS, best_set
 from jaxident.diagnosis.causes.unexplained import UNEXPLAINED, Rest, unexplained
 from jaxident.diagnosis.motion.responses import Responses, respond
+from jaxident.diagnosis.motion.rims import rims_of, sized_noise
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.diagnosis.noise.law import Law, first_law, variances_of, whitener_of
 from jaxident.diagnosis.noise.sizing import size_noise
@@ -225,18 +226,24 @@ def noise_beside(state: Settled, law: Law, sized: bool, memory_too: bool = True)
     if sized:
         residual, starts = fit.linear.residual, fit.linear.starts
         law = size_noise(residual, starts, data.windows, responses, LIKELY, memory_too)
-    return law, unexplained(data, fit, responses, law, sized, memory_too)
+    rest = unexplained(data, fit, responses, law, sized, memory_too)
+    if sized and data.rims is not None:
+        rest = rest._replace(law=rest.law._replace(wheel=sized_noise(data.rims, fit.linear.rims, data.windows)))
+    return law, rest
 
 
 def same_law(one: Law, other: Law) -> bool:
     """Whether two laws have the same parts, about as large."""
     if (one.slip_time, one.coloured_time) != (other.slip_time, other.coloured_time):
         return False
-    pairs = zip(variances_of(one), variances_of(other), strict=True)
+    wheels = [(one.wheel**2, other.wheel**2)] if one.wheel and other.wheel else []
+    pairs = [*zip(variances_of(one), variances_of(other), strict=True), *wheels]
     return all(abs(np.log(max(a, 1e-300) / max(b, 1e-300))) < SAME for a, b in pairs)
 
 
 def whiten(solution: Solution, windows: Windows, law: Law) -> tuple[Data, Responses]:
     """The data under a law, slip linearised about a solution."""
-    responses = respond(np.exp(solution.vector[:2]), solution.linear.residual, windows)
-    return Data(windows, whitener_of(law, windows, responses)), responses
+    rates = np.exp(solution.vector[:2])
+    responses = respond(rates, solution.linear.residual, windows)
+    rims = rims_of(solution.linear.rims, rates, law.wheel, windows)
+    return Data(windows, whitener_of(law, windows, responses), rims), responses

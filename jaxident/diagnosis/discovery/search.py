@@ -34,8 +34,8 @@ FEWEST = 8
 
 
 def discover(finding: Finding) -> list[Bending]:
-    """Fits with one curve, two and so on; none where nothing is worth it."""
-    windows = finding.data.windows
+    """Fits with one curve, two and so on; none where nothing is worth it. Poses alone judge a curve."""
+    windows = finding.data.windows._replace(wheels=None, turning=None)
     now = Bending(finding.fit, (), finding.law)
     found: list[Bending] = []
     while len(windows.run) >= FEWEST and len(found) < MOST_LAWS:

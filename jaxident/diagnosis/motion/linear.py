@@ -14,6 +14,7 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.diagnosis.motion.paths import move, push_of, residuals
 from jaxident.diagnosis.motion.responses import answer_to_start
+from jaxident.diagnosis.motion.rims import rim_speeds
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.coordinates import BY_DRIVE, NOMINAL, PLACES, limits, sizes
 from jaxident.effects.discovered import Laws
@@ -28,11 +29,13 @@ START_STEPS = np.array([1e-5, 1e-4])
 
 class Linear(NamedTuple):
     """Residuals (windows, numbers), derivatives of the modelled poses by coordinates (windows, numbers, columns) and by
-    the own start state (windows, numbers, 5); numbers are rows times x, y, heading."""
+    the own start state (windows, numbers, 5); numbers are rows times x, y, heading. rims: the
+    speeds of the rims in place of residuals (`motion.rims`), and their derivatives; None without wheel speeds."""
 
     residual: Any
     slopes: Any
     starts: Any
+    rims: Any = None
 
 
 class Gram(NamedTuple):
@@ -82,7 +85,18 @@ def linearise(vector: Array, starts: Array, windows: Windows, places: list[int],
     # by position and heading in closed form; a robot that loses speed to friction or in turns is not slowed as it says
     answers = answer_to_start(np.exp(vector[:2]), found[0], windows)
     answers[..., 3:] = change[..., columns:] / START_STEPS
-    return Linear(found[0], change[..., :columns] / step, answers)
+    return Linear(found[0], change[..., :columns] / step, answers, _of_rims(vectors, lanes, windows, laws, step))
+
+
+def _of_rims(vectors: Array, lanes: Array, windows: Windows, laws: Laws | None, step: Array) -> Linear | None:
+    """Rims at the first of some vectors and starts, and what they gain by the others."""
+    if windows.wheels is None:
+        return None
+    found = rim_speeds(vectors, lanes, windows, laws)
+    change = np.moveaxis(found[1:] - found[:1], 0, -1)
+    starts = np.zeros((*found.shape[1:], START_STATES))
+    starts[..., 3:] = change[..., len(step) :] / START_STEPS
+    return Linear(found[0], change[..., : len(step)] / step, starts)
 
 
 def motion_of(vector: Array, starts: Array, windows: Windows, laws: Laws | None = None) -> list[np.ndarray]:
@@ -93,15 +107,19 @@ def motion_of(vector: Array, starts: Array, windows: Windows, laws: Laws | None 
     return [*states, np.asarray(push.mean).mean(axis=1).transpose(2, 0, 1)]
 
 
-def gram(whitener: Array, columns: Array, starts: Array) -> Gram:
-    """Products of columns (windows, numbers, n) after a whitener (windows, numbers, numbers)."""
-    rest, solve = without_starts(whitener, columns, starts)
+def gram(whitener: Array, columns: Array, starts: Array, more: Array | None = None) -> Gram:
+    """Products of columns (windows, numbers, n) after a whitener (windows, numbers, numbers); `more`: white rows of
+    another sensor (windows, rows, n + 5), start states last."""
+    rest, solve = without_starts(whitener, columns, starts, more)
     return Gram(rest.transpose(0, 2, 1) @ rest, solve)
 
 
-def without_starts(whitener: Array, columns: Array, starts: Array) -> tuple[np.ndarray, np.ndarray]:
+def without_starts(
+    whitener: Array, columns: Array, starts: Array, more: Array | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Whitened columns (windows, numbers, n) free of start states, and what these take of them (windows, 5, n)."""
     whitened = whitener @ np.concatenate([columns, starts], axis=2)  # the whitener is read once
+    whitened = whitened if more is None else np.concatenate([whitened, more], axis=1)
     columns, starts = whitened[..., :-START_STATES], whitened[..., -START_STATES:]
     scale = np.sqrt(np.sum(starts**2, axis=1, keepdims=True)) + 1e-300
     basis, upper = np.linalg.qr(starts / scale)

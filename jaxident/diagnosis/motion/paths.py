@@ -40,13 +40,28 @@ def push_of(vector: Array, windows: Windows) -> Push:
 
 def move(vector: Array, starts: Array, push: Push, windows: Windows, laws: Laws | None = None) -> State:
     """True states (rows, windows) under pushes (rows, substeps, 2, windows)."""
+    return _moved(vector, starts, push, windows, laws)[0]
+
+
+def rolled(vector: Array, starts: Array, push: Push, windows: Windows, laws: Laws | None = None) -> tuple[Array, Array]:
+    """Speed [m/s] and turn rate [rad/s] (rows, windows) that the rims of both wheels have: those of the robot, and what
+    wheels that slide turn faster than the ground."""
+    states, excess = _moved(vector, starts, push, windows, laws)
+    drive = drive_of(vector)
+    right, left = sum(excess[0::2]), sum(excess[1::2])
+    faster = [(row[0] * right + row[1] * left) / rate for row, rate in zip(drive.gain, drive.rate, strict=True)]
+    return states.v + faster[0], states.w + faster[1]
+
+
+def _moved(vector: Array, starts: Array, push: Push, windows: Windows, laws: Laws | None) -> tuple[State, list]:
+    """True states, and by how much each wheel turns faster than the ground [unit]."""
     settings, drive, part = with_laws(by_effect(vector), laws), drive_of(vector), windows.step / SUBSTEPS
     time = windows.session[windows.run] + windows.t[windows.first, windows.run]
     begin = time + jnp.cumsum(windows.step, axis=0) - windows.step
 
     def body(carry, row):
         state, excess = carry
-        return advance_row(settings, drive, state, excess, row), state
+        return advance_row(settings, drive, state, excess, row), (state, excess)
 
     rows = Row(push.mean, push.slope, part, lags_of(drive, part), begin)
     return jax.lax.scan(body, (State(*starts), rolling(starts[0])), rows)[1]

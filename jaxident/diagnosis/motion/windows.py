@@ -19,7 +19,8 @@ class Windows(NamedTuple):
     t (rows of a piece, pieces) [s]: since the piece's first row; session (pieces,) [s]: session time of that row;
     command (rows of a piece, pieces, 2). step (rows, windows) [s]: from each row to the next; pose (rows, windows, 3);
     seen (rows, windows); run (windows,): of which piece; first (windows,): its first row there; row (windows,): in
-    the log.
+    the log. wheels (rows, windows, 2) [rad/s], turning (rows, windows): wheel speeds, and where both were measured;
+    None in logs without.
     """
 
     t: Any
@@ -31,6 +32,8 @@ class Windows(NamedTuple):
     run: Any
     first: Any
     row: Any
+    wheels: Any = None
+    turning: Any = None
 
 
 class Piece(NamedTuple):
@@ -73,11 +76,26 @@ def cut(log: Log, rows: int, stride: int | None = None, pieces: list[Piece] | No
     run, first, seen, inside = run[kept], first[kept], seen[kept], inside[kept]
     pose = np.stack(stacked.pose, axis=-1)
     begins = np.array([run_begins(log)[piece.run] + piece.begin for piece in pieces])
+    wheels, turning = _wheels_of(own, run, inside, places[kept] < length)
     return Windows(
         t=t.T, session=np.asarray(session, float), command=np.stack(stacked.command, axis=-1).transpose(1, 0, 2),
         step=step[run[:, None], inside].T, pose=pose[run[:, None], inside].transpose(1, 0, 2), seen=seen.T,
-        run=run, first=first, row=begins[run] + first,
+        run=run, first=first, row=begins[run] + first, wheels=wheels, turning=turning,
     )  # fmt: skip
+
+
+def _wheels_of(runs: list[Log], run: Array, inside: Array, there: Array) -> tuple[Any, Any]:
+    """Wheel speeds (rows, windows, 2) and where both were measured, of places `inside` runs (windows, rows); None for
+    logs without."""
+    if runs[0].wheel_r is None:
+        return None, None
+    length = max(len(own.t) for own in runs)
+    whole = np.full((len(runs), length, 2), np.nan)
+    for k, own in enumerate(runs):
+        whole[k, : len(own.t)] = np.stack([own.wheel_r, own.wheel_l], axis=1)
+    cut_out = whole[run[:, None], inside]
+    turning = np.isfinite(cut_out).all(axis=2) & there
+    return np.where(turning[..., None], cut_out, 0.0).transpose(1, 0, 2), turning.T
 
 
 def uncut(commands: Array, period: float) -> Windows:
@@ -93,6 +111,8 @@ def uncut(commands: Array, period: float) -> Windows:
 
 def take(windows: Windows, chosen: Array) -> Windows:
     """Some of the windows; the runs stay whole."""
+    if windows.wheels is not None:
+        windows = windows._replace(wheels=windows.wheels[:, chosen], turning=windows.turning[:, chosen])
     return windows._replace(
         step=windows.step[:, chosen], pose=windows.pose[:, chosen], seen=windows.seen[:, chosen],
         run=windows.run[chosen], first=windows.first[chosen], row=windows.row[chosen],

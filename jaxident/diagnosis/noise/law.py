@@ -17,7 +17,8 @@ SMALL = 12
 
 class Law(NamedTuple):
     """Standard deviations: white camera error [m], [rad]; slip as an acceleration [m/s^2], [rad/s^2] of correlation
-    time [s], None without; camera error with a memory, None without."""
+    time [s], None without; camera error with a memory, None without; a wheel speed's
+    noise [rad/s], None for that by differences."""
 
     position: float
     heading: float
@@ -25,6 +26,7 @@ class Law(NamedTuple):
     slip_time: float | None = None
     coloured: tuple[float, float] | None = None
     coloured_time: float | None = None
+    wheel: float | None = None
 
 
 def less_slip(law: Law, factor: float) -> Law:
