@@ -19,12 +19,12 @@ import numpy as np
 import jaxident as ji
 from experiments.diagonal import PERIOD, ROBOT, TRUTH
 from jaxident.array_types import AT_REST, Pose, Wheels
-from jaxident.estimation.blocks import block_length
 from jaxident.estimation.bootstrap import PILOTS, enlargement, refit, summarise
-from jaxident.estimation.maximum_likelihood import fit_runs
-from jaxident.estimation.parameters import Law, names
-from jaxident.estimation.precision import natural_values
-from jaxident.estimation.runs import Runs
+from jaxident.estimation.poses.maximum_likelihood import fit_runs
+from jaxident.estimation.poses.parameters import Law, names
+from jaxident.estimation.poses.runs import Runs
+from jaxident.estimation.uncertainty.blocks import block_length
+from jaxident.estimation.uncertainty.precision import natural_values
 from jaxident.robot.excitation import EXCITATIONS
 from jaxident.robot.noise import Noise, draw_noise, observe
 from jaxident.robot.simulate import run_physical

@@ -22,10 +22,10 @@ import jaxident as ji
 from experiments.bootstrap_coverage import D_MAX, NOISES, record
 from experiments.diagonal import DRIVE, ROBOT, TRUTH
 from experiments.rows import write_rows
-from jaxident.estimation.maximum_likelihood import Fit, fit_runs
-from jaxident.estimation.noise_law import fit_law
-from jaxident.estimation.parameters import Law, Robot, to_vector
-from jaxident.estimation.precision import bound_covariance, natural_values
+from jaxident.estimation.poses.maximum_likelihood import Fit, fit_runs
+from jaxident.estimation.poses.noise_law import fit_law
+from jaxident.estimation.poses.parameters import Law, Robot, to_vector
+from jaxident.estimation.uncertainty.precision import bound_covariance, natural_values
 from jaxident.robot.noise import Noise
 
 LEVELS = (0.2, 0.5, 1.0, 2.0, 5.0)  # [mm]

@@ -34,7 +34,7 @@ import jaxident as ji
 from experiments import bootstrap_coverage
 from experiments.diagonal import PERIOD, ROBOT
 from experiments.rows import write_rows
-from jaxident.estimation.maximum_likelihood import fit_runs
+from jaxident.estimation.poses.maximum_likelihood import fit_runs
 from jaxident.log import Log, join
 from jaxident.robot.model import Effect
 from jaxident.study.batch import in_parallel

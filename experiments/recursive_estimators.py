@@ -21,13 +21,13 @@ import numpy as np
 import jaxident as ji
 from experiments.diagonal import DRIVE, PERIOD, TRUTH
 from jaxident.array_types import AT_REST, Wheels
-from jaxident.estimation import joint_filter, recursive
-from jaxident.estimation.initialise import initialise
-from jaxident.estimation.observations import observe_log
-from jaxident.estimation.parameters import Law, Robot, to_vector
-from jaxident.estimation.precision import bound_covariance, difference_covariance
-from jaxident.estimation.regressors import key_terms
-from jaxident.estimation.runs import Runs
+from jaxident.estimation.increments.initialise import initialise
+from jaxident.estimation.increments.observations import observe_log
+from jaxident.estimation.increments.regressors import key_terms
+from jaxident.estimation.online import joint_filter, recursive
+from jaxident.estimation.poses.parameters import Law, Robot, to_vector
+from jaxident.estimation.poses.runs import Runs
+from jaxident.estimation.uncertainty.precision import bound_covariance, difference_covariance
 from jaxident.log import Log
 from jaxident.robot.dead_zone import effective_command
 from jaxident.robot.difference import to_difference

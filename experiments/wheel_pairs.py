@@ -14,10 +14,10 @@ import jax
 
 import jaxident as ji
 from jaxident.diagnosis.causes.finding import find_effects
+from jaxident.diagnosis.posterior import alike
 from jaxident.diagnosis.prepare import prepare
-from jaxident.diagnosis.verdict import alike
 from jaxident.effects.catalogue import CATALOGUE
-from jaxident.estimation.observations import poses_only
+from jaxident.estimation.increments.observations import poses_only
 from jaxident.robot.noise import Noise
 from jaxident.robot.wheel_sensor import WheelSensor
 

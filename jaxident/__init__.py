@@ -49,8 +49,8 @@ _HOMES = {
     "Study": "jaxident.study.design",
 }
 _ROOMS = {
-    "recursive": "jaxident.estimation.recursive",
-    "joint_filter": "jaxident.estimation.joint_filter",
+    "recursive": "jaxident.estimation.online.recursive",
+    "joint_filter": "jaxident.estimation.online.joint_filter",
     "effects": "jaxident.effects",
     "study": "jaxident.study",
     "export": "jaxident.export",

@@ -33,8 +33,8 @@ from jaxident.diagnosis import diagnose as diagnosing
 from jaxident.effects import simulate as simulating
 from jaxident.estimation import bootstrap as resampling
 from jaxident.estimation import identify as identifying
-from jaxident.estimation import precision
 from jaxident.estimation import predict as predicting
+from jaxident.estimation.uncertainty import precision
 from jaxident.files.any_log import as_log, as_logs
 
 Function = TypeVar("Function", bound=Callable)

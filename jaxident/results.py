@@ -14,7 +14,7 @@ from jaxident.diagnosis import diagnose as diagnosing
 from jaxident.errors import InputError
 from jaxident.estimation import identify as identifying
 from jaxident.estimation import predict as predicting
-from jaxident.estimation.verdict import Verdict, verdicts
+from jaxident.estimation.uncertainty.verdict import Verdict, verdicts
 from jaxident.files.atomic import make_folder, write_text
 from jaxident.files.diagnosis import diagnosis_to_dict
 from jaxident.files.json_text import format_json

@@ -13,11 +13,11 @@ import pathlib
 
 import jaxident as ji
 from jaxident.diagnosis.account.measure import measure
-from jaxident.diagnosis.causes.direct import direct_effects, direct_evidence, present
+from jaxident.diagnosis.causes.chance_effects import direct_effects, direct_evidence, present
 from jaxident.diagnosis.causes.finding import find_effects
 from jaxident.diagnosis.diagnose import decide
+from jaxident.diagnosis.posterior import judge
 from jaxident.diagnosis.prepare import prepare
-from jaxident.diagnosis.verdict import judge
 from jaxident.effects import CATALOGUE
 from jaxident.effects.coordinates import COORDINATES
 

@@ -70,7 +70,7 @@ def command(**chosen):
     out = chosen["out"]
     if not out:
         raise click.UsageError("Missing option '--out': the log to write")
-    from jaxident.estimation.suspicions import log_suspicions
+    from jaxident.estimation.suspicions.log_suspicions import log_suspicions
     from jaxident.files.logs import write_log
     from jaxident.files.origins import check_beside
 

@@ -95,9 +95,9 @@ def command(logs, columns, method, reading, count, resample, seed, out, report, 
     Example: jaxident identify log.csv --out model.json
     """
     start_jax()
+    from jaxident.estimation.ahead.session import with_session
     from jaxident.estimation.identify import identify
-    from jaxident.estimation.session import with_session
-    from jaxident.estimation.verdict import verdicts
+    from jaxident.estimation.uncertainty.verdict import verdicts
     from jaxident.files.logs import find_logs, read_logs
     from jaxident.files.models import model_to_dict, save_model
     from jaxident.files.origins import with_origin

@@ -39,8 +39,8 @@ def command(model, log, horizon, burn_in, stride, first, last, session_time, out
     Example: jaxident predict model.json log.csv --horizon 100 --out predicted.csv
     """
     start_jax()
+    from jaxident.estimation.ahead.session import time_in_session
     from jaxident.estimation.predict import predict, prediction_error
-    from jaxident.estimation.session import time_in_session
     from jaxident.files.logs import read_whole
     from jaxident.files.models import load_model
     from jaxident.files.origins import check_beside

@@ -12,16 +12,16 @@ from jaxident.diagnosis.account.measure import Gap, measure
 from jaxident.diagnosis.account.models import as_model
 from jaxident.diagnosis.account.shrink import Shrink
 from jaxident.diagnosis.account.where import Place
-from jaxident.diagnosis.causes.direct import direct_effects, direct_evidence, present
+from jaxident.diagnosis.causes.chance_effects import direct_effects, direct_evidence, present
 from jaxident.diagnosis.causes.finding import CLAIMED, Finding, find_effects
+from jaxident.diagnosis.detectability import Replay, answers, replay, visible
+from jaxident.diagnosis.posterior import Judgement, judge
 from jaxident.diagnosis.prepare import Prepared, prepare, suspected_wheels
-from jaxident.diagnosis.replay import Replay, answers, replay, visible
 from jaxident.diagnosis.simulator import Simulator, as_simulator, check_units, inspect_simulator, shared
 from jaxident.diagnosis.translate import to_model
-from jaxident.diagnosis.verdict import Judgement, judge
 from jaxident.effects.coordinates import ASIDE, PLACES
 from jaxident.errors import InputError
-from jaxident.estimation.suspicions import log_suspicions
+from jaxident.estimation.suspicions.log_suspicions import log_suspicions
 from jaxident.log import Log, join
 from jaxident.numerics import require_float64
 from jaxident.robot.model import Model

@@ -18,8 +18,8 @@ from jaxident.diagnosis.noise.law import Law, first_law, white_whitener, whitene
 from jaxident.diagnosis.noise.sizing import size_noise
 from jaxident.effects.coordinates import neutral_vector, nominal_vector
 from jaxident.errors import InputError
-from jaxident.estimation.maximum_likelihood import begin
-from jaxident.estimation.runs import stack_runs
+from jaxident.estimation.poses.maximum_likelihood import begin
+from jaxident.estimation.poses.runs import stack_runs
 from jaxident.log import Log, join
 from jaxident.robot.drive import Physical
 

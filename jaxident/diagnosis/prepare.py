@@ -5,9 +5,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.lost import Lost
+from jaxident.diagnosis.causes.dropped_commands import Lost
 from jaxident.diagnosis.causes.refit import Solution
-from jaxident.diagnosis.frames import (
+from jaxident.diagnosis.motion.windows import Piece, Windows, cut, take
+from jaxident.diagnosis.noise.law import Law
+from jaxident.diagnosis.nominal import lower_valley, rough_fit, starting_point
+from jaxident.diagnosis.pose_screening import (
     Frames,
     find_more_outliers,
     find_outliers,
@@ -15,16 +18,13 @@ from jaxident.diagnosis.frames import (
     frames_of,
     has_outliers,
 )
-from jaxident.diagnosis.motion.windows import Piece, Windows, cut, take
-from jaxident.diagnosis.noise.law import Law
-from jaxident.diagnosis.nominal import lower_valley, rough_fit, starting_point
 from jaxident.diagnosis.roles import split
 from jaxident.effects.coordinates import neutral_vector
 from jaxident.errors import InputError
-from jaxident.estimation.checks import check_informative
-from jaxident.estimation.observations import blind, poses_only
-from jaxident.estimation.stretches import Starts
-from jaxident.estimation.wheel_suspicions import check_wheels
+from jaxident.estimation.ahead.stretches import Starts
+from jaxident.estimation.increments.observations import blind, poses_only
+from jaxident.estimation.suspicions.checks import check_informative
+from jaxident.estimation.suspicions.wheel_suspicions import check_wheels
 from jaxident.log import Log, join, run_begins
 
 BURN = 20

@@ -18,7 +18,7 @@ from jaxident.effects.coordinates import (
     to_catalogue,
     unit_factors,
 )
-from jaxident.estimation.session import with_session
+from jaxident.estimation.ahead.session import with_session
 from jaxident.robot.drive import Physical
 from jaxident.robot.model import Effect, Model, Provenance
 from jaxident.robot.noise import Noise

@@ -10,17 +10,17 @@ import numpy as np
 
 from jaxident.array_types import Array, Increment, Pose
 from jaxident.errors import InputError, WorkError
-from jaxident.estimation import recursive
-from jaxident.estimation.checks import check_informative
 from jaxident.estimation.identify_batch import YARDSTICKS, identify_batch
 from jaxident.estimation.identify_poses import identify_poses
 from jaxident.estimation.identify_recursive import identify_recursively
-from jaxident.estimation.maximum_likelihood import Fit
-from jaxident.estimation.more_noise import camera_error, moves
-from jaxident.estimation.observations import poses_only
-from jaxident.estimation.suspicions import log_suspicions
-from jaxident.estimation.verdict import at_bound, bound_doubts
-from jaxident.estimation.wheel_suspicions import check_wheels
+from jaxident.estimation.increments.observations import poses_only
+from jaxident.estimation.online import recursive
+from jaxident.estimation.poses.maximum_likelihood import Fit
+from jaxident.estimation.suspicions.checks import check_informative
+from jaxident.estimation.suspicions.log_suspicions import log_suspicions
+from jaxident.estimation.suspicions.wheel_suspicions import check_wheels
+from jaxident.estimation.uncertainty.more_noise import camera_error, moves
+from jaxident.estimation.uncertainty.verdict import at_bound, bound_doubts
 from jaxident.log import Log, even_period, join
 from jaxident.numerics import require_float64
 from jaxident.robot.difference import Difference

@@ -8,10 +8,10 @@ import numpy as np
 
 from jaxident.array_types import Array, Increment
 from jaxident.errors import InputError
-from jaxident.estimation.instrumental import fit_instrumental
-from jaxident.estimation.key_term_fit import Batch, fit_key_terms
-from jaxident.estimation.observations import Observations, complete_observations, observe_log
-from jaxident.estimation.readings import earlier, usable
+from jaxident.estimation.increments.input_forms import earlier, usable
+from jaxident.estimation.increments.instrumental import fit_instrumental
+from jaxident.estimation.increments.key_term_fit import Batch, fit_key_terms
+from jaxident.estimation.increments.observations import Observations, complete_observations, observe_log
 from jaxident.log import Log
 from jaxident.robot.dead_zone import effective_command
 from jaxident.robot.difference import Difference, predict_increment

@@ -9,14 +9,14 @@ import numpy as np
 
 from jaxident.array_types import Array, Pose
 from jaxident.errors import InputError, WorkError
-from jaxident.estimation.maximum_likelihood import Fit, uncertain_as_by
-from jaxident.estimation.noise_law import WHITE, colour, fit_law
-from jaxident.estimation.parameters import Law, names, to_vector
-from jaxident.estimation.precision import difference_covariance, spread_of
-from jaxident.estimation.prior import RATE, from_prior
-from jaxident.estimation.runs import Runs, stack_runs, with_wheels
-from jaxident.estimation.suspicions import log_suspicions, odometry_suspicions
-from jaxident.estimation.wheel_colour import WHITE_WHEELS, spacing, thinned, wheel_colour
+from jaxident.estimation.poses.maximum_likelihood import Fit, uncertain_as_by
+from jaxident.estimation.poses.noise_law import WHITE, colour, fit_law
+from jaxident.estimation.poses.parameters import Law, names, to_vector
+from jaxident.estimation.poses.prior import RATE, from_prior
+from jaxident.estimation.poses.runs import Runs, stack_runs, with_wheels
+from jaxident.estimation.poses.wheel_colour import WHITE_WHEELS, spacing, thinned, wheel_colour
+from jaxident.estimation.suspicions.log_suspicions import log_suspicions, odometry_suspicions
+from jaxident.estimation.uncertainty.precision import difference_covariance, spread_of
 from jaxident.log import Log
 from jaxident.robot.model import Model, Provenance
 from jaxident.robot.wheel_sensor import WheelSensor

@@ -7,10 +7,10 @@ import numpy as np
 from jaxident.effects.checks import check_effects
 from jaxident.effects.discovered import check_discovered
 from jaxident.errors import InputError
-from jaxident.estimation import session
-from jaxident.estimation.predict_difference import run_difference_ahead
-from jaxident.estimation.run_ahead import Ahead, run_ahead
-from jaxident.estimation.stretches import Starts, every
+from jaxident.estimation.ahead import session
+from jaxident.estimation.ahead.predict_difference import run_difference_ahead
+from jaxident.estimation.ahead.run_ahead import Ahead, run_ahead
+from jaxident.estimation.ahead.stretches import Starts, every
 from jaxident.log import Log
 from jaxident.numerics import require_float64
 from jaxident.robot.difference import Difference

@@ -8,8 +8,8 @@ from jaxident.diagnosis.account.account import Account, Row
 from jaxident.diagnosis.account.discovered import Shown
 from jaxident.diagnosis.account.measure import Gap
 from jaxident.diagnosis.account.where import OF_COMMANDS, Region
+from jaxident.diagnosis.detectability import Replay
 from jaxident.diagnosis.diagnose import Diagnosis
-from jaxident.diagnosis.replay import Replay
 from jaxident.effects.catalogue import CATALOGUE
 
 SCHEMA = "jaxident.diagnosis/2"

@@ -3,8 +3,8 @@
 import numpy as np
 
 from jaxident.errors import InputError
-from jaxident.estimation.clock_offset import Response, respond, streams_of, streams_of_log
-from jaxident.estimation.wheel_suspicions import wheel_offset
+from jaxident.estimation.suspicions.clock_offset import Response, respond, streams_of, streams_of_log
+from jaxident.estimation.suspicions.wheel_suspicions import wheel_offset
 from jaxident.files.streams import Commands, Poses, wheel_speeds
 from jaxident.log import Log
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from jaxident import plot
 from jaxident.diagnosis.causes.finding import CLAIMED, Entrant
+from jaxident.diagnosis.detectability import DRAWS, FAINT, Replay
 from jaxident.diagnosis.diagnose import Diagnosis
-from jaxident.diagnosis.replay import DRAWS, FAINT, Replay
-from jaxident.diagnosis.verdict import believable_excess, believable_slip, rest_of, slip_of_drive
-from jaxident.diagnosis.visible import smallest_sizes
+from jaxident.diagnosis.posterior import believable_excess, believable_slip, rest_of, slip_of_drive
+from jaxident.diagnosis.smallest_effects import smallest_sizes
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.coordinates import ASIDE, PLACES
 from jaxident.report.page import Figure, Section, Table

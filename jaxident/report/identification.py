@@ -10,9 +10,9 @@ from jaxident import plot
 from jaxident.errors import InputError
 from jaxident.estimation.bootstrap import Bootstrap, describe, interval_cells
 from jaxident.estimation.identify import Identification
-from jaxident.estimation.residual_tests import CHANNELS, DRAWN_LAGS, correlations, fit_percent, residual_tests
-from jaxident.estimation.runs import stack_runs
-from jaxident.estimation.verdict import BORROWED, Verdict
+from jaxident.estimation.poses.residual_tests import CHANNELS, DRAWN_LAGS, correlations, fit_percent, residual_tests
+from jaxident.estimation.poses.runs import stack_runs
+from jaxident.estimation.uncertainty.verdict import BORROWED, Verdict
 from jaxident.files.atomic import Target
 from jaxident.log import Log, join
 from jaxident.report.glossary import glossary

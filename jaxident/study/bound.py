@@ -9,9 +9,9 @@ import numpy as np
 import xarray
 
 from jaxident.array_types import AT_REST, Array, Pose, Wheels
-from jaxident.estimation.parameters import Law, Robot, to_vector
-from jaxident.estimation.precision import bound_covariance, difference_covariance
-from jaxident.estimation.runs import Runs
+from jaxident.estimation.poses.parameters import Law, Robot, to_vector
+from jaxident.estimation.poses.runs import Runs
+from jaxident.estimation.uncertainty.precision import bound_covariance, difference_covariance
 from jaxident.numerics import require_float64
 from jaxident.robot.model import DIFFERENCE_ORDER, require_physical
 from jaxident.robot.noise import Noise

@@ -9,7 +9,7 @@ from support.bags import BEGIN, FORMATS, Bag, name_of
 from support.program import jaxident, refused
 
 import jaxident as ji
-from jaxident.estimation.suspicions import log_suspicions
+from jaxident.estimation.suspicions.log_suspicions import log_suspicions
 from jaxident.files.logs import read_log, write_log
 from jaxident.log import join
 

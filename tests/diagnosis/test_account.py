@@ -16,8 +16,8 @@ from jaxident.diagnosis.account.luck import luck, luck_of_chance
 from jaxident.diagnosis.account.shapley import shapley
 from jaxident.diagnosis.account.slip_check import slip_seen
 from jaxident.diagnosis.motion.windows import whole_runs
-from jaxident.diagnosis.noise.doubt import Draws
 from jaxident.diagnosis.noise.law import Law, deviations, less_slip, variances_of
+from jaxident.diagnosis.noise.variance_uncertainty import Draws
 from jaxident.diagnosis.prepare import judging_starts
 from jaxident.diagnosis.translate import noise_of
 from jaxident.effects.simulate import simulate

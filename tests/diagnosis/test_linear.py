@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from jaxident.diagnosis.causes.corrector import pursue
+from jaxident.diagnosis.causes.discrepancy_basis import pursue
 from jaxident.diagnosis.motion.linear import follow, gram, left_over, linearise
 from jaxident.diagnosis.motion.responses import answer_to_start
 from jaxident.diagnosis.motion.windows import cut

@@ -5,7 +5,6 @@ import pytest
 from support.arcs import along_arcs
 
 from jaxident.diagnosis.motion.responses import answer_to_start, respond
-from jaxident.diagnosis.noise.doubt import MEMORIES, doubt_of, draw_laws, sizes_by_memory
 from jaxident.diagnosis.noise.law import (
     Law,
     covariance,
@@ -17,6 +16,7 @@ from jaxident.diagnosis.noise.law import (
 )
 from jaxident.diagnosis.noise.likelihood import sample
 from jaxident.diagnosis.noise.sizing import size_noise, size_one, steady_gain
+from jaxident.diagnosis.noise.variance_uncertainty import MEMORIES, doubt_of, draw_laws, sizes_by_memory
 
 ROWS, COUNT = 45, 60
 RATES = np.array([4.0, 5.0])

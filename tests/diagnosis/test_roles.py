@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from jaxident.diagnosis.account.models import LOST
-from jaxident.diagnosis.causes.direct import direct_effects, direct_evidence, present
+from jaxident.diagnosis.causes.chance_effects import direct_effects, direct_evidence, present
 from jaxident.diagnosis.causes.finding import find_effects
 from jaxident.diagnosis.motion.paths import track
 from jaxident.diagnosis.motion.windows import cut

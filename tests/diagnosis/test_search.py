@@ -7,13 +7,13 @@ import pytest
 from support.small_robot import LAW, VECTOR, nominal_fit, robot_with, windows_of
 
 from jaxident.diagnosis.causes.columns import tabulate
-from jaxident.diagnosis.causes.corrector import Term
+from jaxident.diagnosis.causes.discrepancy import Rest
+from jaxident.diagnosis.causes.discrepancy_basis import Term
 from jaxident.diagnosis.causes.evidence import evidence_of, log_evidence
 from jaxident.diagnosis.causes.finding import finding_of
 from jaxident.diagnosis.causes.moves import ARRIVED, better, fit_options, look_alikes, stands
 from jaxident.diagnosis.causes.refit import refit
-from jaxident.diagnosis.causes.rounds import Found, Settled, defended, search, settle
-from jaxident.diagnosis.causes.unexplained import Rest
+from jaxident.diagnosis.causes.search_rounds import Found, Settled, defended, search, settle
 from jaxident.diagnosis.motion.linear import linearise
 from jaxident.diagnosis.noise.law import first_law
 from jaxident.effects.coordinates import NOMINAL, PLACES

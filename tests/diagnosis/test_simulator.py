@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from jaxident.diagnosis.causes import direct
+from jaxident.diagnosis.causes import chance_effects
 from jaxident.diagnosis.diagnose import compare_parameters
-from jaxident.diagnosis.frames import Frames
 from jaxident.diagnosis.noise.law import Law
+from jaxident.diagnosis.pose_screening import Frames
 from jaxident.diagnosis.simulator import Simulator, _direct, as_simulator, check_units, is_noisy, rarer, shared
 from jaxident.diagnosis.translate import abreast_of_marker
 from jaxident.effects.coordinates import PLACES, free_places, neutral_vector

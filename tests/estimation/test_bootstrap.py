@@ -7,14 +7,14 @@ import pytest
 
 from jaxident.array_types import Pose, Wheels
 from jaxident.errors import InputError
-from jaxident.estimation.blocks import block_length, draw_blocks, long_run_variance
 from jaxident.estimation.bootstrap import bootstrap
 from jaxident.estimation.identify import identify
-from jaxident.estimation.likelihood import innovations
-from jaxident.estimation.noise_law import NOISE_LAWS
-from jaxident.estimation.parameters import Robot, from_vector, to_vector
-from jaxident.estimation.replicate import replicate_run
-from jaxident.estimation.runs import Runs
+from jaxident.estimation.poses.likelihood import innovations
+from jaxident.estimation.poses.noise_law import NOISE_LAWS
+from jaxident.estimation.poses.parameters import Robot, from_vector, to_vector
+from jaxident.estimation.poses.runs import Runs
+from jaxident.estimation.uncertainty.blocks import block_length, draw_blocks, long_run_variance
+from jaxident.estimation.uncertainty.replicate import replicate_run
 from jaxident.log import Log, make_log
 from jaxident.robot.drive import Physical
 from jaxident.robot.excitation import EXCITATIONS

@@ -5,7 +5,7 @@ import pytest
 
 from jaxident.array_types import Pose, Wheels
 from jaxident.errors import InputError
-from jaxident.estimation.clock_offset import _follow, respond, streams_of, streams_of_log
+from jaxident.estimation.suspicions.clock_offset import _follow, respond, streams_of, streams_of_log
 from jaxident.files.offset import estimate_offset
 from jaxident.files.streams import Commands, Poses
 from jaxident.log import Log, join

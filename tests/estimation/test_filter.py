@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from jaxident.array_types import Pose, State, Wheels
-from jaxident.estimation.filter import filter_run
-from jaxident.estimation.likelihood import Innovations, innovations, negative_log_likelihood
-from jaxident.estimation.parameters import Law, Robot, to_vector
-from jaxident.estimation.runs import Runs
+from jaxident.estimation.poses.filter import filter_run
+from jaxident.estimation.poses.likelihood import Innovations, innovations, negative_log_likelihood
+from jaxident.estimation.poses.parameters import Law, Robot, to_vector
+from jaxident.estimation.poses.runs import Runs
 from jaxident.robot.drive import Force, Physical, hold
 from jaxident.robot.noise import Noise
 

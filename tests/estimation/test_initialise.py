@@ -8,9 +8,9 @@ from support.nelder_mead import COSTS, nelder_mead
 from support.records import random_log
 
 from jaxident.errors import InputError
-from jaxident.estimation.initialise import initialise
-from jaxident.estimation.observations import observe_log
-from jaxident.estimation.readings import NAMES as READINGS
+from jaxident.estimation.increments.initialise import initialise
+from jaxident.estimation.increments.input_forms import NAMES as READINGS
+from jaxident.estimation.increments.observations import observe_log
 from jaxident.log import Log, make_log
 from jaxident.robot.difference import Difference
 from jaxident.robot.excitation import prbs, staircase

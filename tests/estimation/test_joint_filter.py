@@ -7,13 +7,22 @@ import pytest
 
 from jaxident.array_types import AT_REST, State, Wheels
 from jaxident.errors import InputError
-from jaxident.estimation import joint_filter
-from jaxident.estimation.filter import first_belief, scan_filter
-from jaxident.estimation.joint_filter import LOST_AFTER, Sample, estimate, init, init_from_model, start, step, to_model
-from jaxident.estimation.joint_step import expected_output
-from jaxident.estimation.parameters import NAMES, Law, Robot, to_vector
-from jaxident.estimation.precision import bound_covariance
-from jaxident.estimation.runs import Runs
+from jaxident.estimation.online import joint_filter
+from jaxident.estimation.online.joint_filter import (
+    LOST_AFTER,
+    Sample,
+    estimate,
+    init,
+    init_from_model,
+    start,
+    step,
+    to_model,
+)
+from jaxident.estimation.online.joint_step import expected_output
+from jaxident.estimation.poses.filter import first_belief, scan_filter
+from jaxident.estimation.poses.parameters import NAMES, Law, Robot, to_vector
+from jaxident.estimation.poses.runs import Runs
+from jaxident.estimation.uncertainty.precision import bound_covariance
 from jaxident.log import make_log
 from jaxident.robot.dead_zone import effective_command
 from jaxident.robot.drive import Physical, force, hold

@@ -10,12 +10,12 @@ import pytest
 from jaxident.array_types import AT_REST, Pose, Wheels
 from jaxident.errors import InputError
 from jaxident.estimation.identify import identify
-from jaxident.estimation.maximum_likelihood import fit_runs
-from jaxident.estimation.noise_law import NOISE_LAWS
-from jaxident.estimation.parameters import Law, Robot, bounds, from_vector, names, to_vector
-from jaxident.estimation.precision import bound_covariance, natural_values
-from jaxident.estimation.runs import Runs, stack_runs
-from jaxident.estimation.scoring import Point, _general_local, _white_local, local_at
+from jaxident.estimation.poses.maximum_likelihood import fit_runs
+from jaxident.estimation.poses.noise_law import NOISE_LAWS
+from jaxident.estimation.poses.parameters import Law, Robot, bounds, from_vector, names, to_vector
+from jaxident.estimation.poses.runs import Runs, stack_runs
+from jaxident.estimation.poses.scoring import Point, _general_local, _white_local, local_at
+from jaxident.estimation.uncertainty.precision import bound_covariance, natural_values
 from jaxident.log import Log, make_log
 from jaxident.robot.drive import Physical
 from jaxident.robot.excitation import EXCITATIONS

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxident.array_types import Pose
-from jaxident.estimation.observations import observe_log
+from jaxident.estimation.increments.observations import observe_log
 from jaxident.log import Log, make_log
 from jaxident.robot.path_length import increment_between
 

@@ -7,7 +7,7 @@ from estimation.test_maximum_likelihood import DEAD_ZONE, DRIVE, PERIOD, logged
 
 from jaxident.array_types import State
 from jaxident.errors import InputError
-from jaxident.estimation.precision import cramer_rao
+from jaxident.estimation.uncertainty.precision import cramer_rao
 from jaxident.files.models import load_model
 from jaxident.log import make_log
 from jaxident.robot.drive import Physical

@@ -9,7 +9,7 @@ from support.records import without_poses
 
 from jaxident.effects.simulate import simulate as simulate_with_effects
 from jaxident.errors import InputError
-from jaxident.estimation.parameters import NAMES
+from jaxident.estimation.poses.parameters import NAMES
 from jaxident.estimation.predict import predict, prediction_error
 from jaxident.files.models import load_model
 from jaxident.log import Log, join

@@ -7,10 +7,9 @@ import pytest
 
 from jaxident.array_types import AT_REST, Pose, Wheels
 from jaxident.estimation.identify import identify
-from jaxident.estimation.maximum_likelihood import fit_runs
-from jaxident.estimation.parameters import Law, Robot, names, to_vector
-from jaxident.estimation.precision import natural_values
-from jaxident.estimation.prior import (
+from jaxident.estimation.poses.maximum_likelihood import fit_runs
+from jaxident.estimation.poses.parameters import Law, Robot, names, to_vector
+from jaxident.estimation.poses.prior import (
     MOSTLY,
     RATE,
     RATE_SPREAD,
@@ -22,8 +21,9 @@ from jaxident.estimation.prior import (
     prior_of,
     prior_terms,
 )
-from jaxident.estimation.runs import Runs
-from jaxident.estimation.verdict import verdicts
+from jaxident.estimation.poses.runs import Runs
+from jaxident.estimation.uncertainty.precision import natural_values
+from jaxident.estimation.uncertainty.verdict import verdicts
 from jaxident.log import Log, join, make_log
 from jaxident.robot.drive import Physical
 from jaxident.robot.excitation import EXCITATIONS

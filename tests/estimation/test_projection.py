@@ -5,9 +5,9 @@ import jax.numpy as jnp
 import numpy as np
 from support.records import random_log
 
-from jaxident.estimation.observations import observe_log
-from jaxident.estimation.projection import inputs_of, profile, project, triangle
-from jaxident.estimation.readings import one_step, usable
+from jaxident.estimation.increments.input_forms import one_step, usable
+from jaxident.estimation.increments.observations import observe_log
+from jaxident.estimation.increments.projection import inputs_of, profile, project, triangle
 from jaxident.log import Log
 
 WIDTHS = (0.0, 0.1, 0.3), (0.05, 0.2)

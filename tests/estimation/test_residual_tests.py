@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from jaxident.array_types import Pose, Wheels
-from jaxident.estimation.residual_tests import (
+from jaxident.estimation.poses.residual_tests import (
     LAGS,
     WHITE_CHANNEL,
     correlations,

@@ -14,15 +14,15 @@ from jaxident.array_types import State, Wheels
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.coordinates import vector_of
 from jaxident.effects.simulate import simulate as simulate_with_effects
-from jaxident.estimation.filter import scan_filter
-from jaxident.estimation.filtered_state import filter_and_run
-from jaxident.estimation.joint_start import unsure
-from jaxident.estimation.joint_step import advance_belief
+from jaxident.estimation.ahead.filtered_state import filter_and_run
+from jaxident.estimation.ahead.run_ahead import run_ahead
+from jaxident.estimation.ahead.session import session_time, with_session
+from jaxident.estimation.ahead.stretches import Starts, cut_stretches, every
+from jaxident.estimation.online.joint_start import unsure
+from jaxident.estimation.online.joint_step import advance_belief
+from jaxident.estimation.poses.filter import scan_filter
+from jaxident.estimation.poses.runs import Runs
 from jaxident.estimation.predict import predict, prediction_error
-from jaxident.estimation.run_ahead import run_ahead
-from jaxident.estimation.runs import Runs
-from jaxident.estimation.session import session_time, with_session
-from jaxident.estimation.stretches import Starts, cut_stretches, every
 from jaxident.log import join, make_log
 from jaxident.robot.dead_zone import effective_command
 from jaxident.robot.drive import Physical, force, hold

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from jaxident.array_types import Pose, Wheels
-from jaxident.estimation import starter
-from jaxident.estimation.runs import Runs
+from jaxident.estimation.poses import starter
+from jaxident.estimation.poses.runs import Runs
 
 ROWS, WINDOWS, STEP, RATE = 40, 3, 0.05, 2.0
 

@@ -7,8 +7,8 @@ import jax
 import numpy as np
 import pytest
 
-from jaxident.estimation.parameters import Robot
-from jaxident.estimation.suspicions import log_suspicions, motions, odometry_suspicions
+from jaxident.estimation.poses.parameters import Robot
+from jaxident.estimation.suspicions.log_suspicions import log_suspicions, motions, odometry_suspicions
 from jaxident.files.models import load_model
 from jaxident.log import Log, join
 from jaxident.robot.drive import Physical

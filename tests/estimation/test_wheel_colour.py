@@ -8,7 +8,7 @@ import pytest
 
 import jaxident as ji
 from jaxident.array_types import Wheels
-from jaxident.estimation.wheel_colour import WHITE_WHEELS, spacing, thinned, wheel_colour
+from jaxident.estimation.poses.wheel_colour import WHITE_WHEELS, spacing, thinned, wheel_colour
 from jaxident.robot.drive import Physical
 from jaxident.robot.wheel_sensor import WheelSensor
 from jaxident.study.synthetic import excite, simulate_runs

@@ -10,8 +10,8 @@ import pytest
 import jaxident as ji
 from jaxident.columns import parse_columns
 from jaxident.errors import InputError
-from jaxident.estimation.wheel_answer import answer_of_wheels
-from jaxident.estimation.wheel_suspicions import check_wheels, wheel_offset
+from jaxident.estimation.suspicions.wheel_answer import answer_of_wheels
+from jaxident.estimation.suspicions.wheel_suspicions import check_wheels, wheel_offset
 from jaxident.files.shifted import shift_wheels
 from jaxident.robot.drive import Physical
 from jaxident.robot.wheel_sensor import WheelSensor

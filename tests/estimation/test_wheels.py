@@ -11,10 +11,10 @@ import jaxident as ji
 from jaxident.array_types import Wheels
 from jaxident.diagnosis.diagnose import unused_wheels
 from jaxident.errors import InputError
-from jaxident.estimation.maximum_likelihood import fit_runs
-from jaxident.estimation.parameters import Law, names
-from jaxident.estimation.precision import bound_covariance, natural_values
-from jaxident.estimation.runs import Runs
+from jaxident.estimation.poses.maximum_likelihood import fit_runs
+from jaxident.estimation.poses.parameters import Law, names
+from jaxident.estimation.poses.runs import Runs
+from jaxident.estimation.uncertainty.precision import bound_covariance, natural_values
 from jaxident.robot.drive import Physical
 from jaxident.robot.wheel_sensor import WheelSensor, measure_wheels, wheel_rates
 from jaxident.study.synthetic import excite, simulate_runs

@@ -8,9 +8,9 @@ import pytest
 from jaxident.array_types import AT_REST, Increment, State, Wheels
 from jaxident.errors import InputError
 from jaxident.estimation.identify import identify
-from jaxident.estimation.instrumental import fit_instrumental
-from jaxident.estimation.key_term_fit import fit_key_terms, solve_instrumental
-from jaxident.estimation.observations import complete_observations
+from jaxident.estimation.increments.instrumental import fit_instrumental
+from jaxident.estimation.increments.key_term_fit import fit_key_terms, solve_instrumental
+from jaxident.estimation.increments.observations import complete_observations
 from jaxident.log import make_log
 from jaxident.robot.difference import Difference
 from jaxident.robot.excitation import EXCITATIONS

@@ -5,7 +5,7 @@ import pytest
 from support.diagnoses import LARGEST, VERDICTS, discovered_law, finding_of, made_up
 
 from jaxident.diagnosis.diagnose import Parameter
-from jaxident.diagnosis.visible import smallest_sizes
+from jaxident.diagnosis.smallest_effects import smallest_sizes
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.report import Figure, Table, render
 from jaxident.report.account import account_lines

@@ -7,9 +7,9 @@ from jaxident.array_types import Pose
 from jaxident.errors import InputError
 from jaxident.estimation.bootstrap import Bootstrap
 from jaxident.estimation.identify import Identification
-from jaxident.estimation.likelihood import Innovations
-from jaxident.estimation.maximum_likelihood import Fit
-from jaxident.estimation.verdict import Verdict
+from jaxident.estimation.poses.likelihood import Innovations
+from jaxident.estimation.poses.maximum_likelihood import Fit
+from jaxident.estimation.uncertainty.verdict import Verdict
 from jaxident.log import make_log
 from jaxident.report.identification import write_identification
 from jaxident.robot.drive import Physical

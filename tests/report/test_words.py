@@ -2,7 +2,7 @@
 
 import pytest
 
-from jaxident.estimation.verdict import NOISE_NAMES
+from jaxident.estimation.uncertainty.verdict import NOISE_NAMES
 from jaxident.origin import Input, Origin
 from jaxident.report.glossary import TERMS, glossary
 from jaxident.report.origin import LETTERS, origin_section

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from support.in_process import jaxident
 
-from jaxident.estimation.verdict import at_bound, bound_doubts, verdicts
+from jaxident.estimation.uncertainty.verdict import at_bound, bound_doubts, verdicts
 from jaxident.files.logs import write_log
 from jaxident.files.models import load_model
 from jaxident.robot.drive import Physical

@@ -13,7 +13,7 @@ from support.trials import invented
 
 from jaxident.errors import InputError
 from jaxident.estimation.identify import identify
-from jaxident.estimation.verdict import verdicts
+from jaxident.estimation.uncertainty.verdict import verdicts
 from jaxident.files.models import load_model
 from jaxident.files.summary import write_summary
 from jaxident.plot.names import plain

@@ -10,11 +10,11 @@ from support.stressed import ROWS, Stress, random_robot, random_stress, stressed
 
 import jaxident as ji
 from jaxident.errors import InputError, WorkError
-from jaxident.estimation import joint_filter, recursive
 from jaxident.estimation.identify import identify
-from jaxident.estimation.more_noise import camera_error, moves
+from jaxident.estimation.online import joint_filter, recursive
 from jaxident.estimation.predict import predict
-from jaxident.estimation.verdict import verdicts
+from jaxident.estimation.uncertainty.more_noise import camera_error, moves
+from jaxident.estimation.uncertainty.verdict import verdicts
 from jaxident.numerics import float64_switch
 
 QUICK = ("key-term-least-squares", "paper", "instrumental-variables")

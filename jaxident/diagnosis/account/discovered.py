@@ -15,8 +15,8 @@ from jaxident.diagnosis.discovery.candidates import Kind
 from jaxident.diagnosis.discovery.fit import Bending, as_law
 from jaxident.diagnosis.discovery.forms import Form, form_of
 from jaxident.diagnosis.discovery.search import discover
-from jaxident.diagnosis.noise.doubt import Draws
 from jaxident.diagnosis.noise.law import deviations
+from jaxident.diagnosis.noise.variance_uncertainty import Draws
 from jaxident.diagnosis.prepare import Prepared
 from jaxident.robot.model import Discovered, Model
 

@@ -14,8 +14,8 @@ import numpy as np
 from jaxident.diagnosis.account.judging import CHANNELS, Judged, into_channels, judge_model
 from jaxident.diagnosis.account.luck import luck, luck_of_chance
 from jaxident.diagnosis.account.models import LOST, without
-from jaxident.diagnosis.noise.doubt import Draws
 from jaxident.diagnosis.noise.law import Law, deviations
+from jaxident.diagnosis.noise.variance_uncertainty import Draws
 from jaxident.diagnosis.prepare import Prepared
 from jaxident.diagnosis.translate import noise_of
 from jaxident.effects.catalogue import BY_CHANCE, CATALOGUE

@@ -15,8 +15,8 @@ from jaxident.diagnosis.account.models import placebo_of, players_of, with_playe
 from jaxident.diagnosis.account.shrink import HIGH, LOW, Shrink, interval, shrink_of
 from jaxident.diagnosis.account.sized import REPLAYS, sized_corrected
 from jaxident.diagnosis.account.where import Place, increments, locate
+from jaxident.diagnosis.causes.discrepancy import UNEXPLAINED
 from jaxident.diagnosis.causes.finding import Finding
-from jaxident.diagnosis.causes.unexplained import UNEXPLAINED
 from jaxident.diagnosis.noise.law import deviations
 from jaxident.diagnosis.prepare import Prepared
 from jaxident.robot.model import Model

@@ -6,13 +6,13 @@ import numpy as np
 
 from jaxident.diagnosis.account.models import Corrected, corrected_of
 from jaxident.diagnosis.account.slip_check import slip_seen
+from jaxident.diagnosis.causes.discrepancy import UNEXPLAINED
 from jaxident.diagnosis.causes.finding import Finding
-from jaxident.diagnosis.causes.unexplained import UNEXPLAINED
 from jaxident.diagnosis.discovery.fit import Bending, as_law
 from jaxident.diagnosis.motion.responses import respond
-from jaxident.diagnosis.noise.doubt import Draws, draw_laws, sizes_by_memory
 from jaxident.diagnosis.noise.law import Law, less_slip
 from jaxident.diagnosis.noise.likelihood import Amounts, Sized, sample
+from jaxident.diagnosis.noise.variance_uncertainty import Draws, draw_laws, sizes_by_memory
 from jaxident.diagnosis.prepare import Prepared
 
 REPLAYS = 500

@@ -13,7 +13,7 @@ from jaxident.diagnosis.account.judging import judge_model
 from jaxident.diagnosis.account.shrink import RESAMPLES, blocks
 from jaxident.diagnosis.noise.law import Law, deviations
 from jaxident.diagnosis.prepare import Prepared
-from jaxident.estimation.stretches import Starts
+from jaxident.estimation.ahead.stretches import Starts
 from jaxident.robot.model import Model
 from jaxident.robot.noise import Noise
 

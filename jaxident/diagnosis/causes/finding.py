@@ -6,11 +6,11 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxident.diagnosis.causes.columns import Table
+from jaxident.diagnosis.causes.discrepancy import Rest
 from jaxident.diagnosis.causes.evidence import WRONG, Worth, evidence_of, worth
 from jaxident.diagnosis.causes.refit import Data, Solution, refit
-from jaxident.diagnosis.causes.rounds import TERMS, Found, Settled, search
 from jaxident.diagnosis.causes.search import joining
-from jaxident.diagnosis.causes.unexplained import Rest
+from jaxident.diagnosis.causes.search_rounds import TERMS, Found, Settled, search
 from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.prepare import Prepared, repaired
 

@@ -10,7 +10,7 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.causes.alike import with_prior
 from jaxident.diagnosis.causes.finding import Finding
 from jaxident.diagnosis.causes.refit import Data, Solution
-from jaxident.diagnosis.causes.rounds import LIKELY, SURE, whiten
+from jaxident.diagnosis.causes.search_rounds import LIKELY, SURE, whiten
 from jaxident.diagnosis.discovery.candidates import KINDS, KNOTS, candidates, path_of
 from jaxident.diagnosis.discovery.curves import Bent, bend
 from jaxident.diagnosis.discovery.fit import (

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.estimation.runs import stack_runs
+from jaxident.estimation.poses.runs import stack_runs
 from jaxident.log import Log, join, run_begins
 
 SMALLEST = 8

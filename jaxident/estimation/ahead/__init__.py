@@ -1,0 +1,1 @@
+"""From where a robot is to where it will be: filtered start states, and motion ahead of them."""

@@ -1,0 +1,1 @@
+"""Estimators that take one row at a time, on the robot itself."""

@@ -1,0 +1,84 @@
+"""State and parameters carried together over one step: the prediction of the joint extended Kalman filter."""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax.scipy.stats import norm
+
+from jaxident.array_types import Array
+from jaxident.estimation.poses.filter import Belief, advance_with_slopes, step_weights
+from jaxident.robot.drive import Physical, hold
+from jaxident.robot.noise import Noise
+
+PARAMETERS = 8
+"""The belief ends with two log rates, four gains and two dead zones, as `parameters.to_vector` orders them."""
+SMALLEST_WIDTH = 1e-9
+
+
+class Drift(NamedTuple):
+    """How parameters may change: a memory [s], and variances (PARAMETERS,) that they never exceed."""
+
+    memory: Any
+    widest: Any
+
+
+def advance_belief(
+    belief: Belief, command: Array, step: Array, noise: Noise, coupling: Any, drift: Drift | None
+) -> Belief:
+    """The belief one step [s] later under a held command (2,); `coupling` (2,) is known, or None.
+
+    The parameters stay and become less certain: their covariance grows by exp(step / memory), up to the widest. With
+    drift None it does not grow, and dead zones are taken at their mean width: the mean is then that of a free run.
+    """
+    mean, covariance = belief
+    unknowns = mean[-PARAMETERS:]
+    gain = unknowns[2:6].reshape(2, 2)
+    width_deviation = jnp.sqrt(jnp.maximum(jnp.diagonal(covariance)[-2:], 0.0))
+    passed, by_width = expected_output(command, unknowns[6:], 0.0 if drift is None else width_deviation)
+    pull = jnp.sum(gain * passed, axis=1)
+
+    def moved(log_rate):
+        found = advance_with_slopes(
+            mean[:5], pull, step_weights(hold(Physical(jnp.exp(log_rate), gain, coupling), step))
+        )
+        return found[0], found
+
+    by_rate, (state, by_state, by_pull) = jax.jacfwd(moved, has_aux=True)(unknowns[:2])
+    by_gain = (by_pull[:, :, None] * passed).reshape(5, 4)
+    by_unknowns = jnp.concatenate([by_rate, by_gain, (by_pull @ gain) * by_width], axis=1)
+    transition = jnp.eye(len(mean)).at[:5, :5].set(by_state).at[:5, -PARAMETERS:].set(by_unknowns)
+    entry = by_pull * (jnp.stack([noise.slip_along, noise.slip_heading]) / jnp.sqrt(step))
+    mean = mean.at[:5].set(state)
+    fresh = jnp.zeros(len(mean))
+    if noise.correlation_time is not None:
+        left, errors = jnp.exp(-step / noise.correlation_time), jnp.arange(5, 8)
+        transition = transition.at[errors, errors].set(left)
+        camera = jnp.stack([noise.position, noise.position, noise.heading]) ** 2
+        mean, fresh = mean.at[5:8].multiply(left), fresh.at[5:8].set((1.0 - left**2) * camera)
+    covariance = transition @ covariance @ transition.T + jnp.diag(fresh)
+    covariance = covariance.at[:5, :5].add(entry @ entry.T)
+    return Belief(mean, covariance if drift is None else _forget(covariance, step, drift))
+
+
+def expected_output(command: Array, width: Array, deviation: Array) -> tuple[Array, Array]:
+    """Mean output of dead zones of Gaussian width, and its mean slope by the width; all (2,).
+
+    For u > 0 and z = (u - D) / s: s (z Phi(z) + phi(z)) and -Phi(z), odd in u. An uncertain edge near a level has
+    neither a slope of -1 nor of 0: a linearisation at the mean width would bias every step there.
+    """
+    deviation = jnp.maximum(deviation, SMALLEST_WIDTH)
+    clear = (jnp.abs(command) - width) / deviation
+    share = norm.cdf(clear)
+    side = jnp.sign(command)
+    return side * deviation * (clear * share + norm.pdf(clear)), -side * share
+
+
+def _forget(covariance: Array, step: Array, drift: Drift) -> Array:
+    """The covariance with that of the parameters grown by the memory, no variance beyond the widest."""
+    own = covariance[-PARAMETERS:, -PARAMETERS:]
+    growth = jnp.expm1(step / drift.memory)
+    variance = jnp.diagonal(own)
+    room = jnp.clip(drift.widest - variance, 0.0, growth * variance)
+    scale = jnp.sqrt(room / jnp.maximum(variance, 1e-300))
+    return covariance.at[-PARAMETERS:, -PARAMETERS:].add(own * scale * scale[:, None])

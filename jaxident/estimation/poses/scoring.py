@@ -1,0 +1,243 @@
+"""Fisher scoring with Levenberg-Marquardt damping for unknowns shared by all runs and start states of each run.
+
+With z and log s of `likelihood`, gradient and expected curvature of -log p are sums over samples of
+    z dz + dlog s / 2        and        E' E + dlog s' dlog s / 2,   E = dz + z dlog s / 2
+(E is the derivative of the innovation over sqrt(s)). Start states touch their own run alone: they are eliminated run by
+run (Schur complement), so that the cost grows linearly with runs. optimistix has no solver for either structure.
+"""
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from jaxident.array_types import Array
+from jaxident.estimation.poses.likelihood import deviation_steps, innovations
+from jaxident.estimation.poses.parameters import Law, bounds, is_logarithmic, names
+from jaxident.estimation.poses.prior import Prior, prior_terms
+from jaxident.estimation.poses.runs import Runs, run_axes
+
+START_STATES = 5
+FIRST_DAMPING, EASE, STIFFEN, LEAST_DAMPING, LARGEST_DAMPING = 1e-3, 0.03, 10.0, 1e-12, 1e12
+"""The least lies far below the flattest direction of a long run: 1e-6 and 0.1 take 27 steps over 32,000 rows, not 8."""
+TOLERANCE = 1e-7
+"""Expected fall of -log p below which the search ends: a step of 4e-4 standard deviations."""
+KINK_STEP, KINK_TOLERANCE = 1e-2, 1e-4
+"""At a kink: steps of dead zones below this many standard deviations fail, and the rest promises less than this."""
+DEAD_ZONES = slice(6, 8)
+LONGEST_LOG_STEP, LONGEST_SHARE = 1.5, 0.25
+"""A step changes a logarithm by at most this much, and a dead zone by this share of its bound."""
+
+
+class Point(NamedTuple):
+    """Unknowns: shared vector (unknowns,), start states (runs, 5)."""
+
+    shared: Any
+    starts: Any
+
+
+class Local(NamedTuple):
+    """-log p at a point, its gradient in both parts, and expected curvature: shared (unknowns, unknowns), of each start
+    (runs, 5, 5), and between them (runs, unknowns, 5)."""
+
+    value: Any
+    gradient: Point
+    shared: Any
+    starts: Any
+    between: Any
+
+
+class Damping(NamedTuple):
+    """Of the dead zones' part of a step, and of all other unknowns', relative to the curvature.
+
+    Alike along a curved valley, apart at a kink: a step of a dead zone across a level of the commands, where the cost
+    has one, fails however near the optimum all others are; damped alike they would hardly move while it is shortened.
+    """
+
+    dead_zones: Any
+    others: Any
+
+
+class Search(NamedTuple):
+    """Where a search stands: its best point, the curvature there, the point to look at next and whether its dead zones
+    are held as they were, damping, whole steps that failed one after the other, steps taken, whether it has arrived."""
+
+    point: Point
+    local: Local
+    proposed: Point
+    holding: Any
+    damping: Any
+    failures: Any
+    steps: Any
+    arrived: Any
+
+
+def local_at(point: Point, runs: Runs, law: Law) -> Local:
+    """Value, gradient and expected curvature at a point, by forward-mode derivatives through the simulator."""
+
+    of_run = _general_local if law.memory or law.slip or law.wheels else _white_local
+    cut = len(names(law))
+    unknowns = jnp.concatenate([jnp.tile(point.shared, (len(point.starts), 1)), point.starts], axis=1)
+    over = jax.vmap(lambda own, run: of_run(own, run, law), in_axes=(0, run_axes(runs)))
+    value, gradient, curvature = over(unknowns, runs)
+    return Local(
+        jnp.sum(value),
+        Point(jnp.sum(gradient[:, :cut], axis=0), gradient[:, cut:]),
+        jnp.sum(curvature[:, :cut, :cut], axis=0),
+        curvature[:, cut:, cut:],
+        curvature[:, :cut, cut:],
+    )
+
+
+def _general_local(unknowns: Array, run: Runs, law: Law) -> tuple[Array, Array, Array]:
+    """Value, gradient and curvature of one run in its shared and own unknowns (n,)."""
+
+    def both(unknowns):
+        found = innovations(unknowns[:-START_STATES], unknowns[-START_STATES:], run, law)
+        return found, found
+
+    slopes, found = jax.jacfwd(both, has_aux=True)(unknowns)
+    (dz, dlog), (z, log_variance) = slopes.flat(len(unknowns)), found.flat()
+    error = dz + 0.5 * z[:, None] * dlog
+    gradient = dz.T @ z + 0.5 * jnp.sum(dlog, axis=0)
+    return 0.5 * jnp.sum(z**2 + log_variance), gradient, error.T @ error + 0.5 * dlog.T @ dlog
+
+
+def _white_local(unknowns: Array, run: Runs, law: Law) -> tuple[Array, Array, Array]:
+    """The same where the camera error is white and nothing slips: both deviations enter in closed form."""
+    first = names(law).index("position")
+    deviations = unknowns[first : first + 2]
+    others = jnp.concatenate([unknowns[:first], unknowns[first + 2 :]])
+
+    def both(others):
+        shared = jnp.concatenate([others[:first], deviations])
+        found = innovations(shared, others[first:], run, law)
+        return found.normalised, found
+
+    slope, found = jax.jacfwd(both, has_aux=True)(others)
+    slope, z = slope.reshape(-1, len(others)), found.normalised
+    seen = jnp.sum(run.seen)
+    count, squares = jnp.stack([2 * seen, seen]), jnp.stack([jnp.sum(z[:2] ** 2), jnp.sum(z[2] ** 2)])
+    place = jnp.concatenate([jnp.arange(first), jnp.arange(first + 2, len(unknowns))])
+    curvature = jnp.zeros((len(unknowns),) * 2).at[place[:, None], place].set(slope.T @ slope)
+    gradient = jnp.zeros(len(unknowns)).at[place].set(slope.T @ z.ravel())
+    where = first + jnp.arange(2)
+    curvature = curvature.at[where, where].set(2.0 * count)
+    value = 0.5 * (jnp.sum(squares) + jnp.sum(found.log_variance))
+    return value, gradient.at[where].set(count - squares), curvature
+
+
+def rescale(point: Point, runs: Runs, law: Law) -> Point:
+    """The point with the deviations of white errors at their optimum for the rest, in closed form."""
+    if law.slip and not law.wheels:
+        return point
+    found = jax.vmap(lambda start, run: innovations(point.shared, start, run, law), in_axes=(0, run_axes(runs)))(
+        point.starts, runs
+    )
+    low, high = bounds(law, jnp.inf)
+    return point._replace(shared=jnp.clip(point.shared + deviation_steps(found, runs, law), low, high))
+
+
+def eliminate(local: Local, damping: Damping, held: Array) -> tuple[Array, Array, Array]:
+    """The curvature of the shared unknowns with the start states eliminated, its gradient, and the elimination
+    (runs, 5, unknowns + 1); `held` unknowns (unknowns,) stay where they are."""
+    free = jnp.where(held, 0.0, 1.0)
+    shared = local.shared * free[:, None] * free + jnp.diag(1.0 - free)
+    own = jnp.full(len(held), damping.others).at[DEAD_ZONES].set(damping.dead_zones)
+    shared = shared + jnp.diag(own * jnp.diagonal(shared))
+    diagonal = jnp.diagonal(local.starts, axis1=1, axis2=2)
+    own = damping.others * diagonal + 1e-12 * jnp.max(diagonal, axis=1, keepdims=True)
+    starts = local.starts + jax.vmap(jnp.diag)(own)
+    between = local.between * free[:, None]
+    right = jnp.concatenate([between.transpose(0, 2, 1), local.gradient.starts[:, :, None]], axis=2)
+    solved = jnp.linalg.solve(starts, right)
+    reduced = jnp.sum(between @ solved, axis=0)
+    return shared - reduced[:, :-1], free * local.gradient.shared - reduced[:, -1], solved
+
+
+def newton(local: Local, damping: Damping, held: Array) -> tuple[Array, Array, Array]:
+    """The step in the shared unknowns and the start states with some unknowns held, and the fall it promises."""
+    shared, gradient, solved = eliminate(local, damping, held)
+    step = -jnp.linalg.solve(shared, gradient)
+    starts = -(solved[:, :, -1] + solved[:, :, :-1] @ step)
+    promised = -0.5 * (jnp.sum(step * local.gradient.shared) + jnp.sum(starts * local.gradient.starts))
+    return step, starts, promised
+
+
+def along_steady_speeds(shared: Array, step: Array) -> Array:
+    """A vector (unknowns,) moved by a step. Gains move so that steady speeds, gain over rate, move in a straight line:
+    poses tell these best, and a rate that hardly matters would otherwise drag them along."""
+    faster = jnp.repeat(step[:2], 2)
+    gain = jnp.exp(faster) * (shared[2:6] + step[2:6] - shared[2:6] * faster)
+    return (shared + step).at[2:6].set(gain)
+
+
+def propose(search: Search, kinked: Array, law: Law, low: Array, high: Array) -> tuple[Point, Array, Array]:
+    """The damped step from a search's point, shortened where it is long and cut at the bounds; whether it holds the
+    dead zones, as it does where they seem to be at a kink and the others alone promise something; and whether the
+    point is a minimum.
+
+    It is one where the whole step promises next to nothing, or at a kink: where a dead zone meets a level of the
+    commands the cost has two slopes. Both may point up, so that ever smaller steps of the dead zone fail while all
+    other unknowns are at rest.
+    """
+    point, local, damping = search.point, search.local, search.damping
+    slope = local.gradient.shared
+    held = ((point.shared <= low) & (slope > 0.0)) | ((point.shared >= high) & (slope < 0.0))
+    both = jnp.stack([held, held.at[DEAD_ZONES].set(True)])
+    steps, starts, (promised, rest) = jax.vmap(lambda held: newton(local, damping, held))(both)
+    holding = kinked & (rest > KINK_TOLERANCE)
+    step, starts = (jnp.where(holding, part[1], part[0]) for part in (steps, starts))
+    longest = jnp.where(is_logarithmic(law), LONGEST_LOG_STEP, jnp.inf)
+    longest = longest.at[DEAD_ZONES].set(LONGEST_SHARE * high[DEAD_ZONES])
+    part = jnp.minimum(1.0, jnp.min(longest / jnp.maximum(jnp.abs(step), 1e-300)))
+    shared = along_steady_speeds(point.shared, part * step)
+    moved = Point(jnp.clip(shared, low, high), point.starts + part * starts)
+    level = (promised >= 0.0) & (promised < TOLERANCE) & (damping.dead_zones <= FIRST_DAMPING)
+    tiny = jnp.abs(steps[0]) * jnp.sqrt(jnp.diagonal(local.shared)) < KINK_STEP
+    kink = (rest >= 0.0) & (rest * (1.0 + damping.others) < KINK_TOLERANCE) & jnp.all(tiny[DEAD_ZONES])
+    return moved, holding, level | kink
+
+
+def adapt(search: Search, better: Array) -> Search:
+    """Less damping of what moved and did well, more of what moved and did not. A whole step that fails stiffens all;
+    from the second in a row on the dead zones alone, for it is they that are at a kink."""
+    others, failures = search.damping.others, search.failures
+    failed = ~better & ~search.holding
+    stiffer = (~better & search.holding) | (failed & (failures == 0))
+    others = jnp.maximum(others * jnp.where(better, EASE, jnp.where(stiffer, STIFFEN, 1.0)), LEAST_DAMPING)
+    dead_zones = search.damping.dead_zones * jnp.where(search.holding, 1.0, jnp.where(better, EASE, STIFFEN))
+    failures = jnp.where(search.holding, failures, jnp.where(better, 0, failures + 1))
+    return search._replace(damping=Damping(jnp.maximum(dead_zones, others), others), failures=failures)
+
+
+def with_prior(local: Local, shared: Array, law: Law, prior: Prior, sign: float = 1.0) -> Local:
+    """A prior's terms added, or with sign -1 taken away again."""
+    value, gradient, curvature = prior_terms(shared, law, prior)
+    slope = local.gradient._replace(shared=local.gradient.shared + sign * gradient)
+    return local._replace(value=local.value + sign * value, gradient=slope, shared=local.shared + sign * curvature)
+
+
+def search_from(point: Point, runs: Runs, law: Law, d_max: Array, most: int, prior: Prior) -> Search:
+    """Walk downhill from a point until a step promises less than TOLERANCE, at most `most` steps; values and curvatures
+    are those of poses and prior."""
+    low, high = bounds(law, d_max)
+
+    def body(search):
+        there = rescale(search.proposed, runs, law)
+        local = with_prior(local_at(there, runs, law), there.shared, law, prior)
+        better = (local.value <= search.local.value) | (search.steps == 0)
+        point, local = jax.tree.map(lambda a, b: jnp.where(better, a, b), (there, local), (search.point, search.local))
+        after = adapt(search, better)._replace(point=point, local=local, steps=search.steps + 1)
+        kinked = (after.failures > 1) & ~search.holding
+        proposed, holding, arrived = propose(after, kinked, law, low, high)
+        return after._replace(proposed=proposed, holding=holding, arrived=arrived)
+
+    def walking(search):
+        return ~search.arrived & (search.steps < most) & (search.damping.others < LARGEST_DAMPING)
+
+    unknown, count = len(names(law)), len(point.starts)
+    shapes = (unknown, unknown), (count, START_STATES, START_STATES), (count, unknown, START_STATES)
+    nothing = Local(jnp.asarray(jnp.inf), jax.tree.map(jnp.zeros_like, point), *map(jnp.zeros, shapes))
+    damping, no, none = Damping(*jnp.full(2, FIRST_DAMPING)), jnp.asarray(False), jnp.asarray(0)
+    return jax.lax.while_loop(walking, body, Search(point, nothing, point, no, damping, none, none, no))
