@@ -21,10 +21,11 @@ import numpy as np
 import jaxident as ji
 from experiments.diagonal import DRIVE, PERIOD, TRUTH
 from jaxident.array_types import AT_REST, Wheels
+from jaxident.estimation.increments import recursive
 from jaxident.estimation.increments.initialise import initialise
 from jaxident.estimation.increments.observations import observe_log
 from jaxident.estimation.increments.regressors import key_terms
-from jaxident.estimation.online import joint_filter, recursive
+from jaxident.estimation.online import joint_filter
 from jaxident.estimation.poses.parameters import Law, Robot, to_vector
 from jaxident.estimation.poses.runs import Runs
 from jaxident.estimation.uncertainty.precision import bound_covariance, difference_covariance

@@ -15,7 +15,7 @@ import jax
 import jaxident as ji
 from jaxident.diagnosis.causes.finding import find_effects
 from jaxident.diagnosis.posterior import alike
-from jaxident.diagnosis.prepare import prepare
+from jaxident.diagnosis.preparation.prepare import prepare
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.estimation.increments.observations import poses_only
 from jaxident.robot.noise import Noise

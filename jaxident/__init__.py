@@ -49,7 +49,7 @@ _HOMES = {
     "Study": "jaxident.study.design",
 }
 _ROOMS = {
-    "recursive": "jaxident.estimation.online.recursive",
+    "recursive": "jaxident.estimation.increments.recursive",
     "joint_filter": "jaxident.estimation.online.joint_filter",
     "effects": "jaxident.effects",
     "study": "jaxident.study",

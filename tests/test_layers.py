@@ -6,6 +6,8 @@ import pathlib
 import subprocess
 import sys
 
+import pytest
+
 PACKAGE = pathlib.Path(__file__).resolve().parents[1] / "jaxident"
 
 GROUND = ("array_types", "errors", "numerics", "origin", "rules", "columns", "log", "start")
@@ -24,6 +26,11 @@ FLOORS = (
 )
 SIDEWAYS = {("report", "plot"), ("report", "files"), ("plot", "files"), ("export", "files")}
 """Importer and imported within a floor: files, plot, report and export stand side by side."""
+ROWS = {
+    "estimation": ("increments", "poses", "ahead online uncertainty suspicions"),
+    "diagnosis": ("motion", "noise", "fit", "preparation", "causes", "discovery", "account planning"),
+}
+"""Inner rooms of a room, in the order in which data walk through them; its own files stand behind them all."""
 FLOOR_OF = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
 UPSTAIRS = 5
 """The lowest floor that may print and draw."""
@@ -87,6 +94,22 @@ def test_every_room_has_a_floor():
 
 def test_imports_go_down():
     found = [f"{a} -> {b}" for a, targets in GRAPH.items() for b in sorted(targets) if not allowed(a, b)]
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.parametrize("house", ROWS)
+def test_inner_rooms_stand_in_a_row(house):
+    """A module imports from rooms before its own; rooms with the same place import nothing from each other."""
+    place = {name: k for k, names in enumerate(ROWS[house]) for name in names.split()}
+    inner = [(*module.split("."), "")[2] for module in TREES if module.startswith(f"jaxident.{house}.")]
+    found = []
+    assert place.keys() <= set(inner)
+    for module, targets in GRAPH.items():
+        own = module.split(".")
+        for target in targets:
+            other = target.split(".")
+            if own[1:2] == other[1:2] == [house] and len(own) > 3 and own[2] != other[2:3][0]:
+                found += [f"{module} -> {target}"] if place[own[2]] <= place.get(other[2], len(place)) else []
     assert not found, "\n".join(found)
 
 

@@ -17,7 +17,7 @@ from jaxident.diagnosis.causes.chance_effects import direct_effects, direct_evid
 from jaxident.diagnosis.causes.finding import find_effects
 from jaxident.diagnosis.diagnose import decide
 from jaxident.diagnosis.posterior import judge
-from jaxident.diagnosis.prepare import prepare
+from jaxident.diagnosis.preparation.prepare import prepare
 from jaxident.effects import CATALOGUE
 from jaxident.effects.coordinates import COORDINATES
 

@@ -58,7 +58,7 @@ def command(logs, columns, sim, model, horizon, out, seed):
     """
     start_jax()
     from jaxident.diagnosis.diagnose import diagnose
-    from jaxident.diagnosis.prepare import suspected_wheels
+    from jaxident.diagnosis.preparation.prepare import suspected_wheels
     from jaxident.estimation.suspicions.log_suspicions import log_suspicions
     from jaxident.files.atomic import make_folder
     from jaxident.files.diagnosis import diagnosis_to_dict

@@ -12,7 +12,7 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.causes.columns import AMPLITUDE
 from jaxident.diagnosis.causes.evidence import CHANCE
 from jaxident.diagnosis.causes.points import differences, rim_differences, seeded, sizes_of
-from jaxident.diagnosis.causes.refit import Data, Solution
+from jaxident.diagnosis.fit.refit import Data, Solution
 from jaxident.diagnosis.motion.linear import gram, linearise, normal
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.coordinates import COORDINATES, PLACES, SMOOTH, from_catalogue, sizes, unit_factors

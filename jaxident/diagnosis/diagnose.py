@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import NamedTuple
 
-from jaxident.diagnosis import translate
 from jaxident.diagnosis.account.account import Account
 from jaxident.diagnosis.account.discovered import Shown
 from jaxident.diagnosis.account.measure import Gap, measure
@@ -16,9 +15,10 @@ from jaxident.diagnosis.causes.chance_effects import direct_effects, direct_evid
 from jaxident.diagnosis.causes.finding import CLAIMED, Finding, find_effects
 from jaxident.diagnosis.detectability import Replay, answers, replay, visible
 from jaxident.diagnosis.posterior import Judgement, judge
-from jaxident.diagnosis.prepare import Prepared, prepare, suspected_wheels
+from jaxident.diagnosis.preparation import translate
+from jaxident.diagnosis.preparation.prepare import Prepared, prepare, suspected_wheels
+from jaxident.diagnosis.preparation.translate import to_model
 from jaxident.diagnosis.simulator import Simulator, as_simulator, check_units, inspect_simulator, shared
-from jaxident.diagnosis.translate import to_model
 from jaxident.effects.coordinates import ASIDE, PLACES
 from jaxident.errors import InputError
 from jaxident.estimation.suspicions.log_suspicions import log_suspicions

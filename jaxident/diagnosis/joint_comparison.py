@@ -12,8 +12,8 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.finding import CLAIMED, Finding, Values
 from jaxident.diagnosis.causes.points import sizes_of
-from jaxident.diagnosis.causes.refit import Solution, refit
 from jaxident.diagnosis.causes.search_rounds import TERMS
+from jaxident.diagnosis.fit.refit import Solution, refit
 from jaxident.effects.coordinates import COORDINATES, NOMINAL, PLACES, free_places, neutral_vector
 
 MOSTLY = 0.7

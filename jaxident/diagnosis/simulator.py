@@ -7,12 +7,12 @@ import numpy as np
 
 from jaxident.diagnosis.account.measure import measure
 from jaxident.diagnosis.causes.chance_effects import direct_effects, direct_evidence, present
-from jaxident.diagnosis.causes.dropped_commands import gain_beyond
 from jaxident.diagnosis.causes.finding import CLAIMED, Finding, find_effects
-from jaxident.diagnosis.causes.refit import refit
+from jaxident.diagnosis.fit.refit import refit
 from jaxident.diagnosis.joint_comparison import MOSTLY, explain_together
 from jaxident.diagnosis.noise.law import Law, deviations, first_law
-from jaxident.diagnosis.prepare import Prepared, prepare
+from jaxident.diagnosis.preparation.dropped_commands import gain_beyond
+from jaxident.diagnosis.preparation.prepare import Prepared, prepare
 from jaxident.effects.catalogue import BY_CHANCE
 from jaxident.effects.checks import check_effects
 from jaxident.effects.coordinates import vector_of

@@ -13,8 +13,8 @@ from jaxident.errors import InputError, WorkError
 from jaxident.estimation.identify_batch import YARDSTICKS, identify_batch
 from jaxident.estimation.identify_poses import identify_poses
 from jaxident.estimation.identify_recursive import identify_recursively
+from jaxident.estimation.increments import recursive
 from jaxident.estimation.increments.observations import poses_only
-from jaxident.estimation.online import recursive
 from jaxident.estimation.poses.maximum_likelihood import Fit
 from jaxident.estimation.suspicions.checks import check_informative
 from jaxident.estimation.suspicions.log_suspicions import log_suspicions

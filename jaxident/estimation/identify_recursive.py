@@ -7,10 +7,10 @@ import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array, Increment, Wheels
+from jaxident.estimation.increments import recursive
 from jaxident.estimation.increments.initialise import Setup, initialise
 from jaxident.estimation.increments.least_squares import full_covariance
 from jaxident.estimation.increments.observations import observe_log
-from jaxident.estimation.online import recursive
 from jaxident.log import Log
 from jaxident.robot.model import difference_vector
 

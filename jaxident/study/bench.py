@@ -10,9 +10,9 @@ import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import AT_REST, Array, Pose, Wheels
+from jaxident.estimation.increments import recursive
 from jaxident.estimation.increments.initialise import Setup, initialise
 from jaxident.estimation.increments.observations import Observations, complete_observations, observe_log
-from jaxident.estimation.online import recursive
 from jaxident.estimation.poses.maximum_likelihood import Fit, fit_runs
 from jaxident.estimation.poses.runs import Runs
 from jaxident.log import Log, make_log

@@ -15,6 +15,7 @@ from jaxident.array_types import Array, Increment, Pose, Wheels
 from jaxident.errors import InputError
 from jaxident.estimation.identify import D_MAX_SHARE, SETUP_SAMPLES, SETUP_SHARE, SMALLEST_LOG
 from jaxident.estimation.identify_recursive import parameter_covariance
+from jaxident.estimation.increments import recursive
 from jaxident.estimation.increments.batch_covariance import batch_covariance
 from jaxident.estimation.increments.initialise import Setup, initialise
 from jaxident.estimation.increments.input_forms import NAMES, reading_of, usable
@@ -22,7 +23,6 @@ from jaxident.estimation.increments.instrumental import fit_instrumental
 from jaxident.estimation.increments.key_term_fit import Batch, fit_key_terms
 from jaxident.estimation.increments.observations import Observations, complete_observations, observe_log
 from jaxident.estimation.increments.projection import project
-from jaxident.estimation.online import recursive
 from jaxident.estimation.poses.maximum_likelihood import fit_runs
 from jaxident.estimation.poses.parameters import Law, to_vector
 from jaxident.estimation.poses.runs import Runs

@@ -11,9 +11,9 @@ import numpy as np
 
 from jaxident.array_types import AT_REST, Array, Pose, Wheels
 from jaxident.estimation.identify import Identification, identify
+from jaxident.estimation.increments import recursive
 from jaxident.estimation.increments.initialise import initialise
 from jaxident.estimation.increments.observations import observe_log
-from jaxident.estimation.online import recursive
 from jaxident.estimation.predict import Prediction, predict
 from jaxident.log import Log
 from jaxident.robot.dead_zone import effective_command

@@ -18,8 +18,8 @@ from jaxident.diagnosis.account.slip_check import slip_seen
 from jaxident.diagnosis.motion.windows import whole_runs
 from jaxident.diagnosis.noise.law import Law, deviations, less_slip, variances_of
 from jaxident.diagnosis.noise.variance_uncertainty import Draws
-from jaxident.diagnosis.prepare import judging_starts
-from jaxident.diagnosis.translate import noise_of
+from jaxident.diagnosis.preparation.prepare import judging_starts
+from jaxident.diagnosis.preparation.translate import noise_of
 from jaxident.effects.simulate import simulate
 from jaxident.log import join, make_log
 from jaxident.robot.drive import Physical

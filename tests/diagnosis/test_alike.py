@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from support.small_robot import VECTOR, nominal_fit, windows_of
 
-from jaxident.diagnosis.causes.alike import SPREAD, departures, unlikeliness, with_prior
-from jaxident.diagnosis.causes.refit import refit
+from jaxident.diagnosis.fit.alike import SPREAD, departures, unlikeliness, with_prior
+from jaxident.diagnosis.fit.refit import refit
 from jaxident.effects.coordinates import NOMINAL
 
 GAINS = slice(NOMINAL.index("gain_11"), NOMINAL.index("gain_22") + 1)

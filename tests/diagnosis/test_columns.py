@@ -8,7 +8,7 @@ from jaxident.diagnosis.causes.columns import AMPLITUDE, FAR, _answers, _Column,
 from jaxident.diagnosis.causes.evidence import log_evidence, posterior_mean
 from jaxident.diagnosis.causes.moves import fit_options, stands
 from jaxident.diagnosis.causes.points import differences, points_of, seeded, sizes_of
-from jaxident.diagnosis.causes.refit import Data, refit
+from jaxident.diagnosis.fit.refit import Data, refit
 from jaxident.diagnosis.motion.linear import follow, linearise
 from jaxident.diagnosis.noise.law import white_whitener
 from jaxident.effects.coordinates import COORDINATES, NOMINAL, PLACES, SILENT, SMOOTH, sizes

@@ -13,7 +13,7 @@ from jaxident.diagnosis.discovery.curves import bend, solved
 from jaxident.diagnosis.discovery.fit import Curve, as_law
 from jaxident.diagnosis.discovery.forms import beyond, form_of
 from jaxident.diagnosis.discovery.search import discover
-from jaxident.diagnosis.prepare import prepare
+from jaxident.diagnosis.preparation.prepare import prepare
 from jaxident.log import join, make_log
 from jaxident.robot.drive import Physical
 from jaxident.robot.model import Discovered, Model

@@ -8,9 +8,9 @@ from support.arcs import along_arcs
 from support.small_robot import LAW, VECTOR, nominal_fit, windows_of
 
 from jaxident.diagnosis.causes import discrepancy
-from jaxident.diagnosis.causes.alike import departures
 from jaxident.diagnosis.causes.discrepancy_basis import Term, library, pursue
-from jaxident.diagnosis.causes.refit import Data
+from jaxident.diagnosis.fit.alike import departures
+from jaxident.diagnosis.fit.refit import Data
 from jaxident.diagnosis.motion.linear import Linear
 from jaxident.diagnosis.motion.responses import answer_to_start, respond
 from jaxident.diagnosis.noise.law import Law, covariance, first_law, whitener_of

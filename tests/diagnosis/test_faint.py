@@ -7,17 +7,17 @@ import pytest
 from support.small_robot import LAW, ROWS, RUNS, VECTOR, nominal_fit, windows_of
 
 from jaxident.diagnosis.causes.columns import tabulate
-from jaxident.diagnosis.causes.dropped_commands import find_lost, gain_beyond
 from jaxident.diagnosis.causes.moves import fit_options, stands
 from jaxident.diagnosis.causes.points import at_best, points_of
-from jaxident.diagnosis.causes.refit import best_starts, bounds, refit
 from jaxident.diagnosis.causes.search import best_set
-from jaxident.diagnosis.causes.steps import likely_steps
 from jaxident.diagnosis.causes.wheel_periodicity import _travels, rhythms
 from jaxident.diagnosis.detectability import Answers, answers, replay, visible
+from jaxident.diagnosis.fit.refit import best_starts, bounds, refit
 from jaxident.diagnosis.motion.linear import follow, gram, left_over
 from jaxident.diagnosis.motion.responses import respond
-from jaxident.diagnosis.pose_screening import find_more_outliers, find_outliers, has_outliers
+from jaxident.diagnosis.preparation.dropped_commands import find_lost, gain_beyond
+from jaxident.diagnosis.preparation.pose_screening import find_more_outliers, find_outliers, has_outliers
+from jaxident.diagnosis.preparation.steps import likely_steps
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.coordinates import (
     COORDINATES,

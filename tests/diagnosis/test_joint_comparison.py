@@ -11,8 +11,8 @@ from jaxident.diagnosis.causes.columns import tabulate
 from jaxident.diagnosis.causes.discrepancy import Rest
 from jaxident.diagnosis.causes.discrepancy_basis import Term
 from jaxident.diagnosis.causes.finding import CLAIMED, Finding, finding_of
-from jaxident.diagnosis.causes.refit import refit
 from jaxident.diagnosis.causes.search_rounds import TERMS, search
+from jaxident.diagnosis.fit.refit import refit
 from jaxident.diagnosis.joint_comparison import (
     explain_together,
     lacks,

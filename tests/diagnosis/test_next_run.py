@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from jaxident.array_types import AT_REST
-from jaxident.diagnosis.causes.refit import Data, refit
+from jaxident.diagnosis.fit.nominal import first_starts
+from jaxident.diagnosis.fit.refit import Data, refit
 from jaxident.diagnosis.motion.linear import follow
 from jaxident.diagnosis.motion.windows import cut, uncut
 from jaxident.diagnosis.noise.law import Law, whitener_of
-from jaxident.diagnosis.nominal import first_starts
 from jaxident.diagnosis.planning import next_run, question
 from jaxident.diagnosis.planning.next_run import plan, separations
 from jaxident.diagnosis.planning.trial_inputs import KINDS, make, vary

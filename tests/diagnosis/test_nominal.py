@@ -4,10 +4,10 @@ import jax
 import numpy as np
 import pytest
 
-from jaxident.diagnosis.causes.refit import Data, refit
+from jaxident.diagnosis.fit.nominal import first_starts, lower_valley, rough_fit, steady_point
+from jaxident.diagnosis.fit.refit import Data, refit
 from jaxident.diagnosis.motion.windows import cut
 from jaxident.diagnosis.noise.law import Law, white_whitener
-from jaxident.diagnosis.nominal import first_starts, lower_valley, rough_fit, steady_point
 from jaxident.effects.coordinates import neutral_vector, nominal_vector
 from jaxident.log import Log, join
 from jaxident.robot.drive import Physical

@@ -7,7 +7,7 @@ import pytest
 from jaxident.array_types import State
 from jaxident.diagnosis.motion.paths import push_of, residuals, track
 from jaxident.diagnosis.motion.windows import cut
-from jaxident.diagnosis.translate import abreast_of_marker
+from jaxident.diagnosis.preparation.translate import abreast_of_marker
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.coordinates import (
     COORDINATES,

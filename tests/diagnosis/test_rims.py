@@ -9,13 +9,13 @@ import pytest
 
 import jaxident as ji
 from jaxident.diagnosis.causes.finding import find_effects
-from jaxident.diagnosis.causes.refit import Data, refit
+from jaxident.diagnosis.fit.refit import Data, refit
 from jaxident.diagnosis.motion.linear import follow, linearise
 from jaxident.diagnosis.motion.paths import track
 from jaxident.diagnosis.motion.rims import rim_speeds, rims_of, sized_noise, white_noise
 from jaxident.diagnosis.motion.windows import cut
 from jaxident.diagnosis.noise.law import Law, white_whitener
-from jaxident.diagnosis.prepare import prepare, suspected_wheels
+from jaxident.diagnosis.preparation.prepare import prepare, suspected_wheels
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.coordinates import COORDINATES, PLACES, STEPPED, sizes
 from jaxident.log import join, make_log

@@ -9,8 +9,8 @@ from jaxident.diagnosis.causes.chance_effects import direct_effects, direct_evid
 from jaxident.diagnosis.causes.finding import find_effects
 from jaxident.diagnosis.motion.paths import track
 from jaxident.diagnosis.motion.windows import cut
-from jaxident.diagnosis.prepare import BURN, FEWEST, judging_starts, prepare, shows_start
-from jaxident.diagnosis.roles import LONGEST, PARTS, split
+from jaxident.diagnosis.preparation.prepare import BURN, FEWEST, judging_starts, prepare, shows_start
+from jaxident.diagnosis.preparation.roles import LONGEST, PARTS, split
 from jaxident.effects.coordinates import PLACES, neutral_vector, nominal_vector
 from jaxident.effects.simulate import simulate
 from jaxident.errors import InputError

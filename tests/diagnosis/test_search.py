@@ -12,8 +12,8 @@ from jaxident.diagnosis.causes.discrepancy_basis import Term
 from jaxident.diagnosis.causes.evidence import evidence_of, log_evidence
 from jaxident.diagnosis.causes.finding import finding_of
 from jaxident.diagnosis.causes.moves import ARRIVED, better, fit_options, look_alikes, stands
-from jaxident.diagnosis.causes.refit import refit
 from jaxident.diagnosis.causes.search_rounds import Found, Settled, defended, search, settle
+from jaxident.diagnosis.fit.refit import refit
 from jaxident.diagnosis.motion.linear import linearise
 from jaxident.diagnosis.noise.law import first_law
 from jaxident.effects.coordinates import NOMINAL, PLACES

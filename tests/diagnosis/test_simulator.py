@@ -8,9 +8,9 @@ import pytest
 from jaxident.diagnosis.causes import chance_effects
 from jaxident.diagnosis.diagnose import compare_parameters
 from jaxident.diagnosis.noise.law import Law
-from jaxident.diagnosis.pose_screening import Frames
+from jaxident.diagnosis.preparation.pose_screening import Frames
+from jaxident.diagnosis.preparation.translate import abreast_of_marker
 from jaxident.diagnosis.simulator import Simulator, _direct, as_simulator, check_units, is_noisy, rarer, shared
-from jaxident.diagnosis.translate import abreast_of_marker
 from jaxident.effects.coordinates import PLACES, free_places, neutral_vector
 from jaxident.errors import InputError
 from jaxident.log import make_log
@@ -119,7 +119,7 @@ def test_what_looks_like_a_memory_in_both_cameras_is_no_difference(monkeypatch):
         law = Law(1e-3, 1e-2, coloured=coloured, coloured_time=0.5 if coloured else None)
         return prepared, SimpleNamespace(law=law)
 
-    monkeypatch.setattr(direct, "_memory", lambda finding, price: 0.0)
+    monkeypatch.setattr(chance_effects, "_memory", lambda finding, price: 0.0)
     assert _direct(side((1e-3, 1e-2)), side((1e-3, 1e-2)), 9.0) == ["coloured_noise"]
     assert _direct(side(None), side((1e-3, 1e-2)), 9.0) == []
 

@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from jaxident.diagnosis.causes.refit import Solution
 from jaxident.diagnosis.diagnose import compare_parameters
+from jaxident.diagnosis.fit.refit import Solution
 from jaxident.diagnosis.noise.law import Law
-from jaxident.diagnosis.translate import effect_of, to_model
+from jaxident.diagnosis.preparation.translate import effect_of, to_model
 from jaxident.effects.coordinates import PLACES, free_places, neutral_vector
 from jaxident.log import make_log
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from support.recursion import DEAD_ZONE, record, started
 
+from jaxident.estimation.increments import recursive
 from jaxident.estimation.increments.least_squares import LOWER, Equation, full_covariance, update
-from jaxident.estimation.online import recursive
 
 
 def test_three_samples_by_hand():

@@ -9,11 +9,11 @@ import pytest
 from support.recursion import DEAD_ZONE, PERIOD, ROBOT, record, started
 
 from jaxident.array_types import Increment, Wheels
+from jaxident.estimation.increments import recursive
 from jaxident.estimation.increments.least_squares import LOWER, Equation, full_covariance, update
 from jaxident.estimation.increments.observations import observe_log
+from jaxident.estimation.increments.recursive import Sample
 from jaxident.estimation.increments.regressors import Memory, dot, empty_memory, key_terms, next_row
-from jaxident.estimation.online import recursive
-from jaxident.estimation.online.recursive import Sample
 from jaxident.log import make_log
 from jaxident.robot.difference import Difference
 from jaxident.robot.excitation import multilevel

@@ -11,7 +11,8 @@ from support.stressed import ROWS, Stress, random_robot, random_stress, stressed
 import jaxident as ji
 from jaxident.errors import InputError, WorkError
 from jaxident.estimation.identify import identify
-from jaxident.estimation.online import joint_filter, recursive
+from jaxident.estimation.increments import recursive
+from jaxident.estimation.online import joint_filter
 from jaxident.estimation.predict import predict
 from jaxident.estimation.uncertainty.more_noise import camera_error, moves
 from jaxident.estimation.uncertainty.verdict import verdicts

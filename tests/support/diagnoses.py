@@ -13,15 +13,15 @@ from jaxident.diagnosis.account.where import Place, Region
 from jaxident.diagnosis.causes.discrepancy import Rest
 from jaxident.diagnosis.causes.discrepancy_basis import Term
 from jaxident.diagnosis.causes.finding import Finding, Values
-from jaxident.diagnosis.causes.refit import Solution
 from jaxident.diagnosis.detectability import Replay
 from jaxident.diagnosis.diagnose import Diagnosis, Gap, Parameter
 from jaxident.diagnosis.discovery.candidates import Kind
 from jaxident.diagnosis.discovery.forms import Form
+from jaxident.diagnosis.fit.refit import Solution
 from jaxident.diagnosis.noise.law import Law
-from jaxident.diagnosis.pose_screening import Frames
 from jaxident.diagnosis.posterior import Cause, Judgement
-from jaxident.diagnosis.prepare import Prepared
+from jaxident.diagnosis.preparation.pose_screening import Frames
+from jaxident.diagnosis.preparation.prepare import Prepared
 from jaxident.effects.catalogue import SITES
 from jaxident.effects.coordinates import COORDINATES, NOMINAL, free_places, neutral_vector
 from jaxident.robot.drive import Physical

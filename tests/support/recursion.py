@@ -4,8 +4,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxident.estimation.increments import recursive
 from jaxident.estimation.increments.observations import observe_log
-from jaxident.estimation.online import recursive
 from jaxident.log import Log, make_log
 from jaxident.robot.difference import Difference
 from jaxident.robot.excitation import multilevel

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from jaxident.diagnosis.causes.refit import Data, Solution, refit
+from jaxident.diagnosis.fit.refit import Data, Solution, refit
 from jaxident.diagnosis.motion.linear import follow
 from jaxident.diagnosis.motion.windows import Windows, cut
 from jaxident.diagnosis.noise.law import Law, white_whitener

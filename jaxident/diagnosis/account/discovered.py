@@ -17,7 +17,7 @@ from jaxident.diagnosis.discovery.forms import Form, form_of
 from jaxident.diagnosis.discovery.search import discover
 from jaxident.diagnosis.noise.law import deviations
 from jaxident.diagnosis.noise.variance_uncertainty import Draws
-from jaxident.diagnosis.prepare import Prepared
+from jaxident.diagnosis.preparation.prepare import Prepared
 from jaxident.robot.model import Discovered, Model
 
 

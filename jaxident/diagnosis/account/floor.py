@@ -16,8 +16,8 @@ from jaxident.diagnosis.account.luck import luck, luck_of_chance
 from jaxident.diagnosis.account.models import LOST, without
 from jaxident.diagnosis.noise.law import Law, deviations
 from jaxident.diagnosis.noise.variance_uncertainty import Draws
-from jaxident.diagnosis.prepare import Prepared
-from jaxident.diagnosis.translate import noise_of
+from jaxident.diagnosis.preparation.prepare import Prepared
+from jaxident.diagnosis.preparation.translate import noise_of
 from jaxident.effects.catalogue import BY_CHANCE, CATALOGUE
 from jaxident.log import run_begins
 from jaxident.robot.model import Model

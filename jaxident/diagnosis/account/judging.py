@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.prepare import BURN, Prepared
+from jaxident.diagnosis.preparation.prepare import BURN, Prepared
 from jaxident.estimation.ahead.run_ahead import run_ahead
 from jaxident.log import run_begins
 from jaxident.robot.model import Model

@@ -18,7 +18,7 @@ from jaxident.diagnosis.account.where import Place, increments, locate
 from jaxident.diagnosis.causes.discrepancy import UNEXPLAINED
 from jaxident.diagnosis.causes.finding import Finding
 from jaxident.diagnosis.noise.law import deviations
-from jaxident.diagnosis.prepare import Prepared
+from jaxident.diagnosis.preparation.prepare import Prepared
 from jaxident.robot.model import Model
 
 

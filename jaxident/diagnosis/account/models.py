@@ -9,11 +9,11 @@ import numpy as np
 from jaxident.diagnosis.account.shapley import joined_by
 from jaxident.diagnosis.causes.evidence import log_evidence
 from jaxident.diagnosis.causes.finding import Finding
-from jaxident.diagnosis.causes.refit import Data, refit
 from jaxident.diagnosis.causes.search import joining
+from jaxident.diagnosis.fit.refit import Data, refit
 from jaxident.diagnosis.noise.law import Law
-from jaxident.diagnosis.prepare import Prepared
-from jaxident.diagnosis.translate import to_model
+from jaxident.diagnosis.preparation.prepare import Prepared
+from jaxident.diagnosis.preparation.translate import to_model
 from jaxident.effects.catalogue import BY_CHANCE
 from jaxident.effects.coordinates import COORDINATES, NOMINAL, PLACES, neutral_vector
 from jaxident.robot.model import Model

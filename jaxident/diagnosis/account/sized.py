@@ -13,7 +13,7 @@ from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.noise.law import Law, less_slip
 from jaxident.diagnosis.noise.likelihood import Amounts, Sized, sample
 from jaxident.diagnosis.noise.variance_uncertainty import Draws, draw_laws, sizes_by_memory
-from jaxident.diagnosis.prepare import Prepared
+from jaxident.diagnosis.preparation.prepare import Prepared
 
 REPLAYS = 500
 """Laws of noise, and robots, drawn as likely as the fit leaves them."""

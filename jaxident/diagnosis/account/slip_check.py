@@ -12,7 +12,7 @@ import numpy as np
 from jaxident.diagnosis.account.judging import judge_model
 from jaxident.diagnosis.account.shrink import RESAMPLES, blocks
 from jaxident.diagnosis.noise.law import Law, deviations
-from jaxident.diagnosis.prepare import Prepared
+from jaxident.diagnosis.preparation.prepare import Prepared
 from jaxident.estimation.ahead.stretches import Starts
 from jaxident.robot.model import Model
 from jaxident.robot.noise import Noise

@@ -6,7 +6,7 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.account.judging import CHANNELS
-from jaxident.diagnosis.prepare import Prepared
+from jaxident.diagnosis.preparation.prepare import Prepared
 from jaxident.log import run_begins
 
 OF_COMMANDS = ("u_r", "u_l", "|u|", "largest |u|")

@@ -6,8 +6,8 @@ import numpy as np
 from jaxident.diagnosis.causes.finding import CLAIMED, Finding
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.noise.sizing import steady_gain
-from jaxident.diagnosis.pose_screening import has_outliers
-from jaxident.diagnosis.prepare import Prepared
+from jaxident.diagnosis.preparation.pose_screening import has_outliers
+from jaxident.diagnosis.preparation.prepare import Prepared
 from jaxident.effects.catalogue import BY_CHANCE
 
 

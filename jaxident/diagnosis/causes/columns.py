@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.alike import with_prior
 from jaxident.diagnosis.causes.points import differences, points_of, rim_differences, seeded
-from jaxident.diagnosis.causes.refit import Data, Solution
+from jaxident.diagnosis.fit.alike import with_prior
+from jaxident.diagnosis.fit.refit import Data, Solution
 from jaxident.diagnosis.motion.linear import Linear, gram, linearise, normal
 from jaxident.effects.coordinates import (
     COORDINATES,

@@ -6,10 +6,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.alike import with_prior
 from jaxident.diagnosis.causes.discrepancy_basis import WORTH, Term, library, pursue
-from jaxident.diagnosis.causes.refit import Data, Solution
 from jaxident.diagnosis.causes.wheel_periodicity import rhythms
+from jaxident.diagnosis.fit.alike import with_prior
+from jaxident.diagnosis.fit.refit import Data, Solution
 from jaxident.diagnosis.motion.linear import gram, left_over, normal, spread
 from jaxident.diagnosis.motion.responses import Responses
 from jaxident.diagnosis.noise.law import Law, white_whitener, whitener_of

@@ -21,7 +21,7 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.columns import LOW, NEUTRAL, Table
-from jaxident.diagnosis.causes.refit import Solution
+from jaxident.diagnosis.fit.refit import Solution
 from jaxident.diagnosis.motion.linear import spread
 from jaxident.effects.coordinates import NOMINAL, PLACES, SHAPES, SMOOTH, limits, sizes
 

@@ -8,11 +8,11 @@ import numpy as np
 from jaxident.diagnosis.causes.columns import Table
 from jaxident.diagnosis.causes.discrepancy import Rest
 from jaxident.diagnosis.causes.evidence import WRONG, Worth, evidence_of, worth
-from jaxident.diagnosis.causes.refit import Data, Solution, refit
 from jaxident.diagnosis.causes.search import joining
 from jaxident.diagnosis.causes.search_rounds import TERMS, Found, Settled, search
+from jaxident.diagnosis.fit.refit import Data, Solution, refit
 from jaxident.diagnosis.noise.law import Law
-from jaxident.diagnosis.prepare import Prepared, repaired
+from jaxident.diagnosis.preparation.prepare import Prepared, repaired
 
 CLAIMED = 9.0
 """Log-likelihood from which an effect is claimed that shows in the frames or in the noise law: normal noise reaches it

@@ -9,8 +9,8 @@ import numpy as np
 from jaxident.diagnosis.causes.columns import Table
 from jaxident.diagnosis.causes.evidence import evidence_of, log_evidence, posterior_mean, worth
 from jaxident.diagnosis.causes.points import at_best
-from jaxident.diagnosis.causes.refit import Data, Solution, refit
 from jaxident.diagnosis.causes.search import MOST_EFFECTS, joining
+from jaxident.diagnosis.fit.refit import Data, Solution, refit
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.coordinates import COORDINATES, NOMINAL, PLACES, REACHED, SHAPES, STEPPED, limits, neutral_vector
 

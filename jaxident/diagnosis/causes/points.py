@@ -3,10 +3,10 @@
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.refit import Data, Solution, bounds
-from jaxident.diagnosis.causes.steps import likely_steps
+from jaxident.diagnosis.fit.refit import Data, Solution, bounds
 from jaxident.diagnosis.motion.linear import follow, gram, left_over
 from jaxident.diagnosis.motion.rims import rim_speeds
+from jaxident.diagnosis.preparation.steps import likely_steps
 from jaxident.effects.coordinates import (
     COORDINATES,
     PLACES,

@@ -15,16 +15,16 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.causes.columns import Table, tabulate
 from jaxident.diagnosis.causes.discrepancy import UNEXPLAINED, Rest, unexplained
 from jaxident.diagnosis.causes.discrepancy_basis import WORTH
-from jaxident.diagnosis.causes.dropped_commands import Lost, find_lost
 from jaxident.diagnosis.causes.evidence import worth
 from jaxident.diagnosis.causes.moves import Move, better, fit_options, ranked, stands
-from jaxident.diagnosis.causes.refit import Data, Solution, refit
 from jaxident.diagnosis.causes.search import MOST_EFFECTS, best_set
+from jaxident.diagnosis.fit.refit import Data, Solution, refit
 from jaxident.diagnosis.motion.responses import Responses, respond
 from jaxident.diagnosis.motion.rims import rims_of, sized_noise
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.diagnosis.noise.law import Law, first_law, variances_of, whitener_of
 from jaxident.diagnosis.noise.sizing import size_noise
+from jaxident.diagnosis.preparation.dropped_commands import Lost, find_lost
 from jaxident.effects.coordinates import COORDINATES
 
 MOST_ROUNDS, MOST_LAWS, MOST_REPAIRS = 16, 3, 4

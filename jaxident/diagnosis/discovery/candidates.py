@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.refit import Solution
+from jaxident.diagnosis.fit.refit import Solution
 from jaxident.diagnosis.motion.linear import motion_of
 from jaxident.diagnosis.motion.responses import Responses
 from jaxident.diagnosis.motion.windows import Windows

@@ -5,10 +5,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.alike import unlikeliness, with_prior
-from jaxident.diagnosis.causes.refit import Data, Solution, best_starts, covariance_from
 from jaxident.diagnosis.discovery.candidates import Kind, columns_of, path_of
 from jaxident.diagnosis.discovery.curves import precision, solved
+from jaxident.diagnosis.fit.alike import unlikeliness, with_prior
+from jaxident.diagnosis.fit.refit import Data, Solution, best_starts, covariance_from
 from jaxident.diagnosis.motion.linear import Gram, Linear, gram, linearise
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.noise.law import Law

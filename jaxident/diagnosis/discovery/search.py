@@ -7,9 +7,7 @@ brings to stretches that it was not fitted to. The runs kept for judging have no
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.alike import with_prior
 from jaxident.diagnosis.causes.finding import Finding
-from jaxident.diagnosis.causes.refit import Data, Solution
 from jaxident.diagnosis.causes.search_rounds import LIKELY, SURE, whiten
 from jaxident.diagnosis.discovery.candidates import KINDS, KNOTS, candidates, path_of
 from jaxident.diagnosis.discovery.curves import Bent, bend
@@ -21,6 +19,8 @@ from jaxident.diagnosis.discovery.fit import (
     refit_with,
     smoothness,
 )
+from jaxident.diagnosis.fit.alike import with_prior
+from jaxident.diagnosis.fit.refit import Data, Solution
 from jaxident.diagnosis.motion.linear import without_starts
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.motion.windows import Windows

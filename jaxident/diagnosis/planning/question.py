@@ -7,8 +7,8 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.points import seeded
 from jaxident.diagnosis.noise.law import Law
-from jaxident.diagnosis.prepare import BURN, horizon_rows
-from jaxident.diagnosis.translate import scaled
+from jaxident.diagnosis.preparation.prepare import BURN, horizon_rows
+from jaxident.diagnosis.preparation.translate import scaled
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.coordinates import (
     COORDINATES,

@@ -4,8 +4,8 @@ import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array, Increment
+from jaxident.estimation.increments import recursive
 from jaxident.estimation.increments.least_squares import full_covariance
-from jaxident.estimation.online import recursive
 from jaxident.numerics import safe_divide, solve_positive
 from jaxident.robot.model import DIFFERENCE_ORDER
 

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.refit import Data, Solution, refit
+from jaxident.diagnosis.fit.refit import Data, Solution, refit
 from jaxident.diagnosis.motion.linear import START_STATES
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.motion.windows import Piece, Windows

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.refit import Solution
+from jaxident.diagnosis.fit.refit import Solution
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.estimation.increments.observations import repeats
 from jaxident.log import Log

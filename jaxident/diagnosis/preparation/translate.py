@@ -3,9 +3,9 @@
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.refit import Solution
+from jaxident.diagnosis.fit.refit import Solution
 from jaxident.diagnosis.noise.law import Law, deviations
-from jaxident.diagnosis.prepare import Prepared
+from jaxident.diagnosis.preparation.prepare import Prepared
 from jaxident.effects.catalogue import BY_CHANCE
 from jaxident.effects.coordinates import (
     ASIDE,

@@ -7,7 +7,7 @@ to follow each. To first order a small force gains its product with the slope of
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.refit import Data, Solution
+from jaxident.diagnosis.fit.refit import Data, Solution
 from jaxident.diagnosis.motion.responses import Responses, respond
 
 TEETH = np.arange(2.2, 50.0, 0.08)

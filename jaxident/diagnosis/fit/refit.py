@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.alike import unlikeliness, with_prior
+from jaxident.diagnosis.fit.alike import unlikeliness, with_prior
 from jaxident.diagnosis.motion.linear import Linear, follow, gram, linearise, normal
 from jaxident.diagnosis.motion.rims import Rims, rim_speeds
 from jaxident.diagnosis.motion.windows import Windows

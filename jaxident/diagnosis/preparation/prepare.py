@@ -5,12 +5,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.dropped_commands import Lost
-from jaxident.diagnosis.causes.refit import Solution
+from jaxident.diagnosis.fit.nominal import lower_valley, rough_fit, starting_point
+from jaxident.diagnosis.fit.refit import Solution
 from jaxident.diagnosis.motion.windows import Piece, Windows, cut, take
 from jaxident.diagnosis.noise.law import Law
-from jaxident.diagnosis.nominal import lower_valley, rough_fit, starting_point
-from jaxident.diagnosis.pose_screening import (
+from jaxident.diagnosis.preparation.dropped_commands import Lost
+from jaxident.diagnosis.preparation.pose_screening import (
     Frames,
     find_more_outliers,
     find_outliers,
@@ -18,7 +18,7 @@ from jaxident.diagnosis.pose_screening import (
     frames_of,
     has_outliers,
 )
-from jaxident.diagnosis.roles import split
+from jaxident.diagnosis.preparation.roles import split
 from jaxident.effects.coordinates import neutral_vector
 from jaxident.errors import InputError
 from jaxident.estimation.ahead.stretches import Starts

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.refit import Data, Solution
-from jaxident.diagnosis.causes.steps import past_zone
+from jaxident.diagnosis.fit.refit import Data, Solution
 from jaxident.diagnosis.motion.linear import without_starts
 from jaxident.diagnosis.motion.responses import respond
+from jaxident.diagnosis.preparation.steps import past_zone
 
 LATEST = 3
 """Rows by which a change may be late: four in a row are lost too rarely to matter."""
