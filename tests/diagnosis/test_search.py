@@ -12,7 +12,8 @@ from jaxident.diagnosis.causes.discrepancy_basis import Term
 from jaxident.diagnosis.causes.evidence import evidence_of, log_evidence
 from jaxident.diagnosis.causes.finding import finding_of
 from jaxident.diagnosis.causes.moves import ARRIVED, better, fit_options, look_alikes, stands
-from jaxident.diagnosis.causes.search_rounds import Found, Settled, defended, search, settle
+from jaxident.diagnosis.causes.search_rounds import Found, defended, search, settle
+from jaxident.diagnosis.causes.settled import Settled
 from jaxident.diagnosis.fit.refit import refit
 from jaxident.diagnosis.motion.linear import linearise
 from jaxident.diagnosis.noise.law import first_law
@@ -199,5 +200,13 @@ def test_an_effect_leaves_for_a_term_that_does_the_same_only_if_terms_bring_much
     answers = linearise(fit.vector, fit.starts, data.windows, [PLACES[LAG]]).slopes
     rest = Rest([(Term("actuation", "as the lag does"), gain)], answers, LAW, 0.0)
     settled = Settled(now, data, tabulate(data, fit, now.effects), {})
-    found = defended(Found(settled, LAW, LAW, rest, None))
+    found = defended(Found(settled, LAW, LAW, rest, None, nominal_fit(lagging)[1]))
     assert ("motor_lag" in found.settled.now.effects) == kept
+
+
+@pytest.mark.parametrize(("evidence", "worse"), [(-1.0, True), (1.0, False)])
+def test_a_search_is_held_against_no_effect_at_all(lagging, evidence, worse):
+    data, nominal = nominal_fit(lagging)
+    now = stands(nominal, ())._replace(effects=("motor_lag",), evidence=evidence - nominal.cost)
+    settled = Settled(now, data, tabulate(data, nominal, ()), {})
+    assert Found(settled, LAW, LAW, Rest([], np.zeros(0), LAW, 0.0), None, nominal).worse_than_none == worse

@@ -9,7 +9,6 @@ import pytest
 
 import jaxident as ji
 from jaxident.array_types import Wheels
-from jaxident.diagnosis.diagnose import unused_wheels
 from jaxident.errors import InputError
 from jaxident.estimation.poses.maximum_likelihood import fit_runs
 from jaxident.estimation.poses.parameters import Law, names
@@ -145,12 +144,6 @@ def test_errors_reach_the_bound_of_both_sensors_and_intervals_cover(slip, count)
     assert np.sqrt(np.mean(ratio[robot] ** 2)) < 1.05
     assert ratio[robot].max() < 1.15
     assert 0.93 < covered[ok][:, robot].mean() < 0.97
-
-
-def test_a_diagnosis_says_that_it_does_not_use_them():
-    log = excite(jax.random.key(0), "multilevel", 20, 0.05)
-    assert unused_wheels(log) == ()
-    assert "not used" in unused_wheels([log, log._replace(wheel_r=log.t, wheel_l=log.t)])[0]
 
 
 def test_a_sensor_without_error_reports_the_rim():

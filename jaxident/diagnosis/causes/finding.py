@@ -9,8 +9,9 @@ from jaxident.diagnosis.causes.columns import Table
 from jaxident.diagnosis.causes.discrepancy import Rest
 from jaxident.diagnosis.causes.evidence import WRONG, Worth, evidence_of, worth
 from jaxident.diagnosis.causes.search import joining
-from jaxident.diagnosis.causes.search_rounds import TERMS, Found, Settled, search
-from jaxident.diagnosis.fit.refit import Data, Solution, refit
+from jaxident.diagnosis.causes.search_rounds import TERMS, Found, search
+from jaxident.diagnosis.causes.settled import Settled
+from jaxident.diagnosis.fit.refit import Data, Solution
 from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.preparation.prepare import Prepared, repaired
 
@@ -97,8 +98,7 @@ def find_effects(prepared: Prepared, without: Collection[str] = (), law: Law | N
 def finding_of(prepared: Prepared, found: Found, without: Collection[str] = ()) -> Finding:
     """The finding of a search that has ended."""
     settled = found.settled
-    begin = prepared.nominal if settled.now.effects else settled.now.fit
-    nominal = refit(settled.data, begin.vector, begin.starts, ())
+    nominal = found.nominal if settled.now.effects else settled.now.fit
     values = neighbours(settled, nominal, without)
     return Finding(settled.data, found.law, found.likely, nominal, settled.now.fit, settled.now.effects, values,
                    found.rest, settled.table)  # fmt: skip

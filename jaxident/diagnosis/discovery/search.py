@@ -8,7 +8,8 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.finding import Finding
-from jaxident.diagnosis.causes.search_rounds import LIKELY, SURE, whiten
+from jaxident.diagnosis.causes.search_rounds import SURE
+from jaxident.diagnosis.causes.settled import LIKELY, whiten
 from jaxident.diagnosis.discovery.candidates import KINDS, KNOTS, candidates, path_of
 from jaxident.diagnosis.discovery.curves import Bent, bend
 from jaxident.diagnosis.discovery.fit import (
