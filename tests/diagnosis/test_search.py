@@ -210,3 +210,13 @@ def test_a_search_is_held_against_no_effect_at_all(lagging, evidence, worse):
     now = stands(nominal, ())._replace(effects=("motor_lag",), evidence=evidence - nominal.cost)
     settled = Settled(now, data, tabulate(data, nominal, ()), {})
     assert Found(settled, LAW, LAW, Rest([], np.zeros(0), LAW, 0.0), None, nominal).worse_than_none == worse
+
+
+def test_a_refit_that_begins_at_a_robot_that_runs_away_begins_without_coupling():
+    """Couplings of 2,000 make speeds grow by e every half a millisecond: within a window they leave every number."""
+    data, nominal = nominal_fit(windows_of(VECTOR))
+    wild = nominal.vector.copy()
+    wild[[NOMINAL.index("coupling_1"), NOMINAL.index("coupling_2")]] = 2000.0
+    found = refit(data, wild, nominal.starts, ())
+    assert found.cost == pytest.approx(nominal.cost, abs=0.1)
+    assert np.all(np.isfinite(found.covariance))

@@ -20,6 +20,7 @@ ENOUGH = 0.05
 LONGEST = 0.5
 """A step changes a rate by at most this much, as a logarithm."""
 INSTANTS = [PLACES[pair] for pair, coordinate in REACHED.items() if not coordinate.relative]
+COUPLING = [NOMINAL.index("coupling_1"), NOMINAL.index("coupling_2")]
 PARTS = (1.0, 0.25, 0.0)
 """Of the step of a window's start state that are tried."""
 
@@ -55,16 +56,17 @@ class Solution(NamedTuple):
 
 def refit(data: Data, vector: Array, starts: Array, effects: tuple[str, ...], hold: tuple = (), most=MOST_STEPS):
     """The fit nearest downhill of a vector and starts with the coordinates of `effects` free, but those in `hold`.
-    Where the robot would run away there, effects begin at neutral."""
+    Where the robot would run away there, effects begin at neutral, or couplings too."""
     held = {PLACES[pair] for pair in {*hold, *STEPPED}}
     places = [place for place in free_places(effects) if place not in held]
     vector, starts = np.array(vector), np.array(starts)
     low, high = (bound[places] for bound in bounds(data.windows))
     vector[places] = np.clip(vector[places], low, high)
-    linear, products, solve = _around(data, vector, starts, places)
-    if not np.all(np.isfinite(products)):  # another robot's sizes: with these one would run away
-        vector = neutral_vector(vector[: len(NOMINAL)])
-        linear, products, solve = _around(data, vector, starts, places)
+    for begin in (vector, *_calmer(vector)):
+        linear, products, solve = _around(data, begin, starts, places)
+        if np.all(np.isfinite(products)):
+            break
+    vector = begin
     cost, damping = 0.5 * products[-1, -1] + _taken(data, linear), 1e-4
     for step_number in range(1, most + 1):
         step, promised = _step(products, vector[places], low, high, damping)
@@ -90,6 +92,15 @@ def refit(data: Data, vector: Array, starts: Array, effects: tuple[str, ...], ho
     return Solution(vector, starts, places, linear, cost, covariance_from(products), step_number)
 
 
+def _calmer(vector: Array) -> tuple[np.ndarray, np.ndarray]:
+    """Vectors for a robot that runs away with this one: without effects, whose sizes may be another robot's; and also
+    without coupling, where both speeds settle by themselves."""
+    plain = neutral_vector(vector[: len(NOMINAL)])
+    calm = plain.copy()
+    calm[COUPLING] = 0.0
+    return plain, calm
+
+
 def bounds(windows: Windows) -> tuple[np.ndarray, np.ndarray]:
     """The lowest and highest vector (SIZE,) of a search on some windows."""
     low, high = limits()
@@ -102,9 +113,10 @@ def _around(data: Data, vector: Array, starts: Array, places: list[int]) -> tupl
     """The linearisation there; summed products (n, n) with the prior's, the residual last; and what start states take
     in every window (windows, 5, n)."""
     linear = linearise(vector, starts, data.windows, places)
-    more = None if linear.rims is None else data.of_rims(linear.rims, linear.rims.slopes, residual=True)
     columns = np.concatenate([linear.slopes, linear.residual[..., None]], axis=2)
-    found = gram(data.whitener, columns, linear.starts, more)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # a robot may run away
+        more = None if linear.rims is None else data.of_rims(linear.rims, linear.rims.slopes, residual=True)
+        found = gram(data.whitener, columns, linear.starts, more)
     return linear, with_prior(found.products.sum(axis=0), vector), found.solve
 
 
