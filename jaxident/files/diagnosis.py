@@ -73,6 +73,7 @@ def account_to_dict(account: Account) -> dict[str, Any]:
         "windows": account.windows,
         "failed": account.failed,
         "rows": [_row(row) for row in account.rows],
+        "places": account.places,
     }
 
 

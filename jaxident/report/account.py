@@ -3,7 +3,18 @@
 from typing import TYPE_CHECKING
 
 from jaxident import plot
-from jaxident.diagnosis.account.account import CAMERA, DISCOVERED, REST, SLIP, START, Account, Row
+from jaxident.diagnosis.account.account import (
+    AFTER,
+    BEFORE,
+    CAMERA,
+    DISCOVERED,
+    REST,
+    SLIP,
+    START,
+    UNNAMED,
+    Account,
+    Row,
+)
 from jaxident.report.page import Figure, Section, Table
 from jaxident.report.words import SPACE, angle, length, part, percent
 
@@ -50,7 +61,13 @@ def account_section(account: Account) -> Section:
     failed = f" {account.failed} more count in nothing: a model's prediction was not finite." if account.failed else ""
     text = TEXT.format(horizon=account.horizon, windows=account.windows)
     return Section(
-        heading, [f"{text}{failed}", Figure(plot.image(figure), "Shares of the error by cause", PICTURE), table]
+        heading,
+        [
+            f"{text}{failed}",
+            Figure(plot.image(figure), "Shares of the error by cause", PICTURE),
+            table,
+            places_line(account),
+        ],
     )
 
 
@@ -70,6 +87,18 @@ CAPTION = (
 )
 
 
+PLACE_WORDS = {
+    BEFORE: "before the wheel (command, motors, load)", AFTER: "after the wheel (ground, random slip)",
+    CAMERA: "in the camera", START: "in the start", UNNAMED: "without a name",
+}  # fmt: skip
+
+
+def places_line(account: Account) -> str:
+    """How much of the error lies before the wheel, after it, and elsewhere, in a sentence."""
+    parts = [f"{percent(share)} {PLACE_WORDS[place]}" for place, share in account.places.items()]
+    return f"Of the error lie {', '.join(parts)}."
+
+
 def plain_text(text: str) -> str:
     """A text for terminals of any encoding."""
     return text.replace(SPACE, " ").replace("\N{MINUS SIGN}", "-").replace("²", "^2").replace("±", "+-")
@@ -87,4 +116,4 @@ def account_lines(account: Account) -> list[str]:
         bar = "#" * round(BAR * min(max(row.share, 0.0), 1.0))
         cells = f"{length(row.rms_position):>9} {angle(row.rms_heading):>10} {percent(row.share):>6}"
         lines.append(plain_text(f"  {name:<{width}} {cells}  {bar}").rstrip())
-    return lines
+    return [*lines, plain_text(places_line(account))]

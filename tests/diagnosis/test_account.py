@@ -9,7 +9,7 @@ import jax
 import numpy as np
 import pytest
 
-from jaxident.diagnosis.account.account import account_of
+from jaxident.diagnosis.account.account import PLACES, account_of
 from jaxident.diagnosis.account.floor import Floor, floor_of
 from jaxident.diagnosis.account.judging import judge_model
 from jaxident.diagnosis.account.luck import luck, luck_of_chance
@@ -20,6 +20,7 @@ from jaxident.diagnosis.noise.law import Law, deviations, less_slip, variances_o
 from jaxident.diagnosis.noise.variance_uncertainty import Draws
 from jaxident.diagnosis.preparation.prepare import judging_starts
 from jaxident.diagnosis.preparation.translate import noise_of
+from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.simulate import simulate
 from jaxident.log import join, make_log
 from jaxident.robot.drive import Physical
@@ -221,3 +222,7 @@ def test_without_slip_the_steady_floor_is_all_of_it():
 def test_an_empty_log_to_judge_by_is_no_start():
     log = make_log(PERIOD * np.arange(60), np.ones(60), np.ones(60))
     assert not len(judging_starts(log, whole_runs(log), ROWS).row)
+
+
+def test_every_site_of_the_catalogue_lies_before_the_wheel_or_after_it_or_in_the_camera():
+    assert {record.site for record in CATALOGUE.values()} <= PLACES.keys()

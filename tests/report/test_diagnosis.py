@@ -8,7 +8,7 @@ from jaxident.diagnosis.diagnose import Parameter
 from jaxident.diagnosis.smallest_effects import smallest_sizes
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.report import Figure, Table, render
-from jaxident.report.account import account_lines
+from jaxident.report.account import account_lines, places_line
 from jaxident.report.causes import BESIDE
 from jaxident.report.diagnosis import diagnosis_page
 from jaxident.report.lead import lead
@@ -106,9 +106,20 @@ def test_the_account_is_the_first_picture_and_the_first_lines():
                                               "transport delay", "quadratic drag", "not explained"]  # fmt: skip
     lines = account_lines(found.account)
     assert all(line.isascii() for line in lines)
-    assert len(lines) == 1 + len(table.rows)
+    assert len(lines) == 2 + len(table.rows)
     assert lines[4].split()[:2] == ["transport", "delay"]
     assert lines[4].count("#") > lines[5].count("#") > 0
+    assert plain_spaces(places_line(found.account)) in [plain_spaces(b) for b in part.blocks if isinstance(b, str)]
+
+
+def test_delay_and_drag_lie_before_the_wheel_and_slip_after_it():
+    account = made_up("effects").account
+    places = account.places
+    assert sum(places.values()) == pytest.approx(1.0)
+    assert places["before_wheel"] == pytest.approx(account.share("transport_delay", "quadratic_drag"))
+    assert places["after_wheel"] == pytest.approx(account.share("slip"))
+    assert places["unnamed"] == pytest.approx(account.share("discovered", "rest"))
+    assert account._replace(rows=[]).places == {}
 
 
 def test_replays_are_told_with_what_they_miss():

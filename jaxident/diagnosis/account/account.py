@@ -16,8 +16,16 @@ from jaxident.diagnosis.account.floor import Floor
 from jaxident.diagnosis.account.judging import CHANNELS
 from jaxident.diagnosis.account.shapley import shapley
 from jaxident.diagnosis.account.shrink import HIGH, LOW, blocks
+from jaxident.effects.catalogue import CATALOGUE
 
+BEFORE, AFTER, UNNAMED = "before_wheel", "after_wheel", "unnamed"
 CAMERA, START, SLIP, DISCOVERED, REST = "camera", "start", "slip", "discovered", "rest"
+PLACES = {
+    "actuation": BEFORE, "drive": BEFORE, "time": BEFORE, "contact": AFTER, CAMERA: CAMERA, START: START, SLIP: AFTER,
+    DISCOVERED: UNNAMED, REST: UNNAMED,
+}  # fmt: skip
+"""Where each site of effects, and each other part, lies: command, motors, drive and load move the wheel; the ground and
+random slip come after it."""
 
 
 class Row(NamedTuple):
@@ -45,6 +53,15 @@ class Account(NamedTuple):
     def share(self, *parts: str) -> float:
         """Of some parts together."""
         return sum(row.share for row in self.rows if row.part in parts)
+
+    @property
+    def places(self) -> dict[str, float]:
+        """Shares by place: motors and load before the wheel, ground and random slip after it, camera, start, and what
+        has no name. They add up to one; empty without rows."""
+        found = dict.fromkeys((BEFORE, AFTER, CAMERA, START, UNNAMED), 0.0) if self.rows else {}
+        for row in self.rows:
+            found[PLACES[CATALOGUE[row.part].site if row.part in CATALOGUE else row.part]] += row.share
+        return found
 
     @property
     def named(self) -> tuple[str, ...]:
