@@ -12,7 +12,7 @@ from jaxident.diagnosis.causes.finding import find_effects
 from jaxident.diagnosis.fit.refit import Data, refit
 from jaxident.diagnosis.motion.linear import follow, linearise
 from jaxident.diagnosis.motion.paths import track
-from jaxident.diagnosis.motion.rims import rim_speeds, rims_of, sized_noise, white_noise
+from jaxident.diagnosis.motion.rims import first_noise, rim_speeds, rims_of, sized_noise, white_noise
 from jaxident.diagnosis.motion.windows import cut
 from jaxident.diagnosis.noise.law import Law, white_whitener
 from jaxident.diagnosis.preparation.prepare import prepare, suspected_wheels
@@ -125,6 +125,15 @@ def test_whitened_rims_forget_radius_track_and_the_rims_own_start(windows):
     scaled = linear.rims.residual * np.repeat([1.3, 0.7], rows)
     left = rims.whitener @ (rims.scale * (scaled - linear.rims.residual))[..., None]
     assert np.abs(left).max() < 1e-6 * np.abs(rims.scale * scaled).max() / NOISE
+
+
+@pytest.mark.parametrize(("sizes", "low", "high"), [({}, 0.8, 1.3), ({("motor_lag", "time_constant"): 0.08}, 3.0, 1e3)])
+def test_what_a_first_fit_misses_counts_as_noise_of_the_wheels(sizes, low, high):
+    """Before an effect is found the wheels may not outweigh the poses; without one their noise is what it is."""
+    windows = robot_windows(robot_with(sizes))
+    fit = refit(Data(windows, white_whitener(LAW, windows)), VECTOR, first_starts(windows), ())
+    found = first_noise(fit.linear.rims, np.exp(fit.vector[:2]), windows)
+    assert low * NOISE < found < high * NOISE
 
 
 def test_a_slide_turns_the_rim_faster_than_the_ground():

@@ -21,6 +21,7 @@ from jaxident.diagnosis.causes.search import MOST_EFFECTS, best_set
 from jaxident.diagnosis.causes.settled import Settled, noise_beside, same_law, whiten
 from jaxident.diagnosis.fit.refit import Data, Solution, refit
 from jaxident.diagnosis.motion.responses import respond
+from jaxident.diagnosis.motion.rims import first_noise
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.diagnosis.noise.law import Law, first_law
 from jaxident.diagnosis.noise.sizing import size_noise
@@ -76,11 +77,12 @@ def search(windows: Windows, nominal: Solution, without: Collection[str] = (), l
     taken for an effect.
     """
     begin, sized = Move(nominal, (), -nominal.cost), law is None
-    law = first_law(windows) if law is None else law
+    wheel = first_noise(nominal.linear.rims, np.exp(nominal.vector[:2]), windows)
+    law = first_law(windows)._replace(wheel=wheel) if law is None else law
     ends = [climb(windows, nominal, begin, law, without, sized)]
     if sized and (ends[0].rest.terms or ends[0].worse_than_none):
         responses = respond(np.exp(nominal.vector[:2]), nominal.linear.residual, windows)
-        law = size_noise(nominal.linear.residual, nominal.linear.starts, windows, responses)
+        law = size_noise(nominal.linear.residual, nominal.linear.starts, windows, responses)._replace(wheel=wheel)
         single = best_single(windows, nominal, law, without)
         ends.append(climb(windows, nominal, single, law, without, memory_last=False))
     ends = [each for each in ends if not each.worse_than_none]
