@@ -96,7 +96,7 @@ PLACE_WORDS = {
 def places_line(account: Account) -> str:
     """How much of the error lies before the wheel, after it, and elsewhere, in a sentence."""
     parts = [f"{percent(share)} {PLACE_WORDS[place]}" for place, share in account.places.items()]
-    return f"Of the error lie {', '.join(parts)}."
+    return f"Where the error lies: {', '.join(parts)}."
 
 
 def plain_text(text: str) -> str:
