@@ -8,12 +8,13 @@ import tempfile
 
 import jaxident as ji
 
-from . import baselines, seal
-from .collect import collect
-from .diagnose import DEFAULT, diagnose
-from .draw import draw
-from .judge import added, judge
-from .sets import COUNTS
+from .baselines import methods as baselines
+from .protocol import seal
+from .protocol.collect import collect
+from .protocol.diagnose import DEFAULT, diagnose
+from .protocol.draw import draw
+from .protocol.sets import COUNTS
+from .scoring.judge import added, judge
 
 
 def main() -> None:

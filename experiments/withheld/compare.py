@@ -18,11 +18,11 @@ import numpy as np
 
 import jaxident as ji
 
-from .intervals import bootstrap, matched
-from .judge import added, marked
-from .misses import hidden_of, said_of, wrong
-from .rows import ROWS, Row
-from .score import features
+from .scoring.intervals import bootstrap, matched
+from .scoring.judge import added, marked
+from .scoring.misses import hidden_of, said_of, wrong
+from .scoring.rows import ROWS, Row
+from .scoring.table import features
 
 
 def paired(row: Row, first: list[dict], second: list[dict]) -> dict[str, Any]:

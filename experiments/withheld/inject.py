@@ -12,18 +12,15 @@ outside.
 """
 
 import argparse
-import itertools
 import json
 import pathlib
 
 import numpy as np
 
 import jaxident as ji
-from jaxident.files.streams import merge, read_commands, read_poses
 from jaxident.log import Log, join
 
-CREATES = [f"create_{k}" for k in range(1, 6)]
-CREATE_TRACK, PERIOD, PARTS = 0.258, 0.05, 12
+from .real.logs import PARTS, read_robot
 
 SIZES = {
     "none": {},
@@ -80,17 +77,6 @@ def frozen(places: np.ndarray, probability: float, rng, *columns: np.ndarray) ->
     for copy, column in zip(copies, columns, strict=True):
         copy[places] = column[source]
     return copies
-
-
-def read_robot(data: pathlib.Path, robot: str) -> list[Log]:
-    """The runs of one robot: create_1 .. create_5, each log cut into PARTS, or husky, its windows."""
-    if robot == "husky":
-        return ji.read_log(data / "drive_husky" / "husky.csv.gz").runs()
-    stem = data / "mrclam" / f"D6_R{int(robot.removeprefix('create_'))}"
-    streams = read_commands(f"{stem}_commands.csv.gz"), read_poses(f"{stem}_poses.csv.gz")
-    log = merge(*streams, track=CREATE_TRACK, period=PERIOD)
-    cuts = np.linspace(0, len(log.t), PARTS + 1).astype(int)
-    return [log.rows(first, last) for first, last in itertools.pairwise(cuts)]
 
 
 def write_pair(runs: list[Log], name: str, size: dict[str, float], folder: pathlib.Path, seed: int) -> None:

@@ -21,7 +21,7 @@ from jaxident.diagnosis.preparation.prepare import prepare
 from jaxident.effects import CATALOGUE
 from jaxident.effects.coordinates import COORDINATES
 
-from .intervals import wilson
+from .scoring.intervals import wilson
 
 
 def main() -> None:

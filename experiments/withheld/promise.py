@@ -18,13 +18,14 @@ import jaxident as ji
 from jaxident.estimation.predict import predict
 from jaxident.log import Log, join, make_log
 
-from . import robots
-from .cases import ROWS, hidden, simulate_runs
+from .protocol import robots
+from .protocol.cases import ROWS, hidden, simulate_runs
+from .scoring.rows import FAR, HIGH, LOW
 
 FRESH = 4
+"""Fresh runs of each robot."""
 JUDGING = (2, 5)
-LOW, HIGH, FAR = 0.75, 4.0 / 3.0, 3.0
-"""Between which fresh runs should miss as promised, and above which none should."""
+"""Numbers of the runs that served no fit."""
 
 
 def fresh_plan(answer: dict) -> list[dict]:
@@ -55,7 +56,7 @@ def fresh_logs(answers: dict[str, dict]) -> dict[str, Log]:
                 found[name].append(log)
     for name, answer in answers.items():
         if answer["generator"] != "batch":
-            from .engine_cases import drive_run
+            from .engine_robot.cases import drive_run
 
             found[name] = [drive_run(answer, run) for run in plans[name]]
     return {name: join([as_log(one) for one in logs]) for name, logs in found.items()}

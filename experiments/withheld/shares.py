@@ -27,10 +27,10 @@ from jaxident.diagnosis.preparation.translate import to_model
 from jaxident.log import make_log
 from jaxident.robot.noise import Noise
 
-from .cases import RUNS, simulate_cases
-from .intervals import wilson
-from .marks import mark
 from .promise import unit_of
+from .protocol.cases import RUNS, simulate_cases
+from .scoring.intervals import wilson
+from .scoring.marks import mark
 
 NOISE = ("camera", "start", "slip")
 
@@ -43,7 +43,7 @@ def robots_of(case: dict) -> dict[frozenset[str], list]:
     if case["generator"] == "batch":
         logs = simulate_cases(variants)
     else:
-        from .engine_cases import simulate_case
+        from .engine_robot.cases import simulate_case
 
         logs = [simulate_case(variant) for variant in variants]
     return {

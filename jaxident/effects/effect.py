@@ -30,8 +30,8 @@ How to add an effect
    package names an effect.
 3. Write the law once more as plain statements (`statements.Step`), for exports.
 4. Give it twins, written from the equation and not from the code: in `tests/support/reference_effects.py`, and in the
-   robots with hidden effects (`experiments/withheld`: `batch_robot.NEUTRAL`, `robots.LAWS`). The tests that run over
-   the whole catalogue then compare both integrators with them.
+   robots with hidden effects (`experiments/withheld`: `NEUTRAL` and `LAWS`). The tests that run over the whole
+   catalogue then compare both integrators with them.
 
 An effect that draws has `chance` in place of `search`, and takes `keys` before its values. Where the search has other
 coordinates than the catalogue has parameters (a limit's inverse, say), `search.transform` leads to and fro, and `fast`

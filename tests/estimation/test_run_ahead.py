@@ -7,8 +7,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from withheld import robots
-from withheld.cases import simulate_runs
+from withheld.protocol import robots
+from withheld.protocol.cases import simulate_runs
 
 from jaxident.array_types import State, Wheels
 from jaxident.effects.catalogue import CATALOGUE

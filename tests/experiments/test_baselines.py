@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 from support.withheld_cases import model_of
-from withheld import baselines, cases, inject
-from withheld.refits import refit_errors
-from withheld.terms import regression
+from withheld import inject
+from withheld.baselines import methods as baselines
+from withheld.baselines.refit import refit_errors
+from withheld.baselines.regression import regression
+from withheld.protocol import cases
 
 from jaxident.log import make_log
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from support.reference_effects import simulate_reference
-from withheld.batch_camera import disturbed, mapped
-from withheld.batch_input import BURST, happens
-from withheld.batch_outside import LATER, bumped
-from withheld.batch_robot import NEUTRAL, OUTSIDE, simulate
-from withheld.robots import FORMS, form
+from withheld.batch_robot.camera import disturbed, mapped
+from withheld.batch_robot.commands import BURST, happens
+from withheld.batch_robot.outside import LATER, bumped
+from withheld.batch_robot.simulate import NEUTRAL, OUTSIDE, simulate
+from withheld.protocol.robots import FORMS, form
 
 from jaxident.effects import CATALOGUE
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from withheld.calibration import calibration_error, claims, log_score, overconfidence, tallied, tally_error
+from withheld.scoring.calibration import calibration_error, claims, log_score, overconfidence, tallied, tally_error
 
 
 def said(*causes, silent=()):

@@ -7,7 +7,7 @@ import sys
 
 from support.diagnoses import made_up
 
-from experiments.withheld.collect import collect
+from experiments.withheld.protocol.collect import collect
 from jaxident.files.diagnosis import diagnosis_to_dict
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]

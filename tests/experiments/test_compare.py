@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 from withheld import compare
-from withheld.intervals import matched
-from withheld.rows import ROWS
+from withheld.scoring.intervals import matched
+from withheld.scoring.rows import ROWS
 
 ROW = {row.label: row for row in ROWS}
 NAMED, SHARE = ROW["one effect: named"], ROW["four or five effects: share named"]

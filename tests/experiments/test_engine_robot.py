@@ -5,9 +5,12 @@ import pytest
 
 pytest.importorskip("mujoco")
 
-from withheld import engine_cases, engine_robot, engine_world, robots
-from withheld.engine_robot import Driver, simulate
-from withheld.engine_world import Body
+from withheld.engine_robot import cases as engine_cases
+from withheld.engine_robot import drive as engine_robot
+from withheld.engine_robot import world as engine_world
+from withheld.engine_robot.drive import Driver, simulate
+from withheld.engine_robot.world import Body
+from withheld.protocol import robots
 
 PERIOD, ROWS, START = 0.02, 61, (0.1, -0.2, 0.7)
 COMMANDS = robots.draw_commands(np.random.default_rng(3), ROWS)

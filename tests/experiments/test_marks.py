@@ -1,7 +1,7 @@
 """Marks of hand-written diagnoses."""
 
 import pytest
-from withheld.marks import mark
+from withheld.scoring.marks import mark
 
 BATCH = {"generator": "batch", "strength": [0.3], "inputs": "multilevel"}
 NONE = BATCH | {"kind": "none", "effects": [], "accepted": [], "channels": []}

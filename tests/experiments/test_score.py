@@ -6,14 +6,14 @@ import sys
 import numpy as np
 import pytest
 from support.withheld_cases import model_of
-from withheld import cases, seal
-from withheld.calibration import calibration_error
-from withheld.diagnose import diagnose
-from withheld.fresh import fresh_runs, local_motion, true_shrink
-from withheld.intervals import bootstrap, wilson
-from withheld.judge import added, judge, shrinkable
-from withheld.misses import misses
-from withheld.score import table
+from withheld.protocol import cases, seal
+from withheld.protocol.diagnose import diagnose
+from withheld.scoring.calibration import calibration_error
+from withheld.scoring.fresh import fresh_runs, local_motion, true_shrink
+from withheld.scoring.intervals import bootstrap, wilson
+from withheld.scoring.judge import added, judge, shrinkable
+from withheld.scoring.misses import misses
+from withheld.scoring.table import table
 
 import jaxident as ji
 

@@ -3,7 +3,7 @@
 import json
 import pathlib
 
-from withheld.set_page import lead, set_page
+from withheld.real.set_page import lead, set_page
 
 from jaxident.report.page import render
 

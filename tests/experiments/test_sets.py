@@ -6,9 +6,9 @@ import pathlib
 
 import numpy as np
 import pytest
-from withheld.cases import LATER_FORMAT, write_answers
-from withheld.outside import LATER_SITES, SITES
-from withheld.sets import COUNTS, SINGLE_FRAMES, draw_set, names_of_kind
+from withheld.protocol.cases import LATER_FORMAT, write_answers
+from withheld.protocol.outside import LATER_SITES, SITES
+from withheld.protocol.sets import COUNTS, SINGLE_FRAMES, draw_set, names_of_kind
 
 from jaxident.effects import CATALOGUE
 

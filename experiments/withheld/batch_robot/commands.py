@@ -1,4 +1,4 @@
-"""From commands to what the motors give, in plain NumPy: the input half of `batch_robot`.
+"""From commands to what the motors give, in plain NumPy: the input half of the simulator.
 
 Each effect has two forms: that of `jaxident effects`, and where `form` is not 0 another that robots might have too.
 """

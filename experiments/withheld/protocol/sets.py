@@ -50,13 +50,13 @@ def simulate_block(cases: list[dict]) -> list[list[np.ndarray]]:
     """The logs of each case, all of one generator."""
     if cases[0]["generator"] == "batch":
         return simulate_cases(cases)
-    from .engine_cases import simulate_case
+    from ..engine_robot.cases import simulate_case
 
     return [simulate_case(case) for case in cases]
 
 
 def _engine_cases(rng, name: str) -> list[dict]:
-    from . import engine_cases
+    from ..engine_robot import cases as engine_cases
 
     cases = []
     for kind, count in COUNTS[name].items():

@@ -1,6 +1,6 @@
 r"""One page for a set of robots of one make: what the diagnosis of each says, side by side.
 
-    python -m experiments.withheld.set_page --found experiments/withheld/real/create_*.json \
+    python -m experiments.withheld.real.set_page --found experiments/withheld/real/create_*.json \
         --title "Five Creates" --out creates.html
 
 A cause that all robots of a make share should be named on each of them by itself; the page shows whether it is.
@@ -24,7 +24,7 @@ LIKELY = 0.05
 def set_page(found: dict[str, dict], title: str) -> Page:
     """The page of diagnoses (content of diagnosis.json) by the robot's name."""
     sections = [_gap(found), _where(found), _causes(found)]
-    return Page(title, lead(found), sections, "Made by experiments/withheld/set_page.py")
+    return Page(title, lead(found), sections, "Made by experiments/withheld/real/set_page.py")
 
 
 def lead(found: dict[str, dict]) -> str:

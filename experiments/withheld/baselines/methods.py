@@ -13,8 +13,8 @@ from jaxident.effects import CATALOGUE
 from jaxident.errors import InputError, WorkError
 from jaxident.log import Log
 
-from .refits import refit_errors
-from .terms import Regression, regression
+from .refit import refit_errors
+from .regression import Regression, regression
 
 COMMONEST = "transport_delay"
 MOST = 2

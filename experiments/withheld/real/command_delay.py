@@ -1,6 +1,6 @@
 """How long do commands take to reach the wheels of real robots, and is it always as long?
 
-    python -m experiments.withheld.command_delay --data ../shared/data
+    python -m experiments.withheld.real.command_delay --data ../shared/data
 
 Stretches of three seconds in which the commanded turn rate changes. In each, the delay (5 ms apart) and gain whose
 commanded heading lies nearest the measured one. Beside it the same of a made-up robot that gets the same commands
@@ -13,9 +13,7 @@ import pathlib
 
 import numpy as np
 
-from jaxident.files.streams import read_commands, read_poses
-
-from .inject import CREATES
+from .logs import CREATES, read_streams
 
 LONG, DELAYS = 3.0, np.arange(0.0, 0.6, 0.005)  # [s]
 LEAST_CHANGE, LEAST_POSES, LARGEST_JUMP = 0.25, 120, 0.2
@@ -73,8 +71,7 @@ def main() -> None:
     print("| robot | stretches | delay [s] (quartiles) | gain | delay of the made-up robot [s] |")
     print("|---|---|---|---|---|")
     for robot in options.robots:
-        stem = options.data / "mrclam" / f"D6_R{int(robot.removeprefix('create_'))}"
-        commands, poses = read_commands(f"{stem}_commands.csv.gz"), read_poses(f"{stem}_poses.csv.gz")
+        commands, poses = read_streams(options.data, robot)
         told, seen = (commands.t, commands.value.w), poses.t
         real = readings(*told, seen, np.unwrap(poses.pose.theta))
         even = readings(*told, seen, made_up(*told, seen, np.random.default_rng(0)))

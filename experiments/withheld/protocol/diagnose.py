@@ -43,6 +43,6 @@ def _one(case: pathlib.Path, out: pathlib.Path, command: str) -> dict:
 
 def _environment() -> dict[str, str]:
     """That of this process, with the folder from which it imports the package first."""
-    root = str(pathlib.Path(__file__).resolve().parents[2])
+    root = str(pathlib.Path(__file__).resolve().parents[3])
     paths = [root, *filter(None, [os.environ.get("PYTHONPATH")])]
     return os.environ | {"PYTHONPATH": os.pathsep.join(paths)}

@@ -8,12 +8,12 @@ import numpy as np
 
 import jaxident as ji
 
-from . import picture
+from . import pictures
 from .calibration import claims
 from .fresh import fresh_runs, true_shrink
 from .marks import mark
 from .misses import misses
-from .score import table
+from .table import table
 
 RANDOM = ("coloured_noise", "outliers", "frozen_frames", "lost_commands", "bumps")
 """Effects of chance: they leave nothing to shrink on runs without it."""
@@ -37,7 +37,7 @@ def judge(
     for kind in kinds:
         own = {name: answer for name, answer in answers.items() if answer["generator"] == kind}
         tables[kind] = {method: table([found[name] for name in own]) for method, found in marks.items()}
-        pages.append(f"## {len(own)} cases of the {kind} robot\n\n{picture.text(tables[kind])}")
+        pages.append(f"## {len(own)} cases of the {kind} robot\n\n{pictures.text(tables[kind])}")
         for method, found in marks.items():
             draw(own, {name: found[name] for name in own}, out, f"{kind}_{method}")
     (out / "scores.json").write_text(json.dumps({"tables": tables, "marks": marks}, indent=1) + "\n")
@@ -101,9 +101,9 @@ def draw(answers: dict[str, dict], marks: dict[str, dict], out: pathlib.Path, la
         if len(answer["effects"]) < 2
     }
     if hidden:
-        picture.confusion(
-            [(hidden[name], picture.said(marks[name])) for name in hidden], out / f"confusion_{label}.png"
+        pictures.confusion(
+            [(hidden[name], pictures.said(marks[name])) for name in hidden], out / f"confusion_{label}.png"
         )
     tops = [m["top"] for m in marks.values() if m["top"] is not None]
     if tops:
-        picture.reliable(np.array(tops, float), out / f"reliability_{label}.png")
+        pictures.reliable(np.array(tops, float), out / f"reliability_{label}.png")

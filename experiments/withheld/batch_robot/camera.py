@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .batch_input import happens
+from .commands import happens
 
 OUTSIDE = {"heading_bias": {"amplitude": 0.0, "phase": 0.0}}
 """A bias of the heading that turns with it, theta += a sin(theta - phase): a marker that is not flat."""

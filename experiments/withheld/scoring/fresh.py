@@ -10,8 +10,8 @@ import numpy as np
 import jaxident as ji
 from jaxident.log import Log, make_log
 
-from . import robots
-from .cases import hidden, simulate_runs
+from ..protocol import robots
+from ..protocol.cases import hidden, simulate_runs
 
 RUNS, ROWS = 16, 301
 SMALLEST = 0.01
@@ -31,7 +31,7 @@ def fresh_runs(answer: dict, count: int = RUNS) -> list[tuple[Log, float]]:
     if answer["generator"] == "batch":
         logs = simulate_runs(runs)
     else:
-        from .engine_cases import drive_run
+        from ..engine_robot.cases import drive_run
 
         logs = [drive_run(answer, run) for run in runs]
     times = [run["session_time"] for run in runs]

@@ -1,6 +1,6 @@
 """How near is the engine's plain robot to the nominal model?
 
-    python -m experiments.withheld.plain_engine --robots 6 --out plain_engine.json
+    python -m experiments.withheld.engine_robot.plain --robots 6 --out plain_engine.json
 
 Plain robots are drawn, driven for six runs of 1000 rows without camera error, and identified with coupling: what is
 left over whole runs is all that contact, castors and the engine's steps add, beside the cameras of the sealed cases
@@ -16,8 +16,8 @@ import numpy as np
 import jaxident as ji
 from jaxident.log import make_log
 
-from .cases import plan
-from .engine_cases import describe, drive_run
+from ..protocol.cases import plan
+from .cases import describe, drive_run
 
 
 def excess(seed: int) -> dict[str, float]:

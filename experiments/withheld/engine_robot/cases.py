@@ -4,10 +4,10 @@ import numpy as np
 
 from jaxident.effects import CATALOGUE
 
-from . import robots
-from .cases import ROWS, RUNS, SIM_RUNS, as_log
-from .engine_robot import Driver, simulate
-from .engine_world import Body
+from ..protocol import robots
+from ..protocol.cases import ROWS, RUNS, SIM_RUNS, as_log
+from .drive import Driver, simulate
+from .world import Body
 
 PERIODS = (0.02, 0.03, 0.04)
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from .engine_world import TIMESTEP, Body, world
+from .world import TIMESTEP, Body, world
 
 
 class Driver(NamedTuple):

@@ -1,6 +1,6 @@
 """How fast real robots drive in turns, of what was commanded: a look at the logs without any model.
 
-    python -m experiments.withheld.turning_speed --data ../shared/data --robots create_1 create_2 create_3
+    python -m experiments.withheld.real.turning_speed --data ../shared/data --robots create_1 create_2 create_3
 
 Stretches of half a second count whose command has not changed for a second before. Speed is the arc's, from the first
 pose and the last.
@@ -11,7 +11,7 @@ import pathlib
 
 import numpy as np
 
-from .inject import CREATE_TRACK, CREATES, PERIOD, read_robot
+from .logs import CREATE_TRACK, CREATES, PERIOD, read_robot
 
 SETTLED, LONG = 20, 10
 """Rows before a stretch in which the command stays, and rows of it."""

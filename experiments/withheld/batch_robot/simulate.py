@@ -2,15 +2,15 @@
 
 Shares no code with the package. The forms are those of `jaxident effects`; the integrator is another: Runge-Kutta
 over substeps of held drive, and dry friction as an implicit projection (Moreau's time stepping) instead of events.
-Most effects have another form as well, where their parameter `form` is not zero (`robots.FORMS`): a robot's drag need
-not be quadratic. `OUTSIDE` are effects that no catalogue lists; later ones are in `batch_outside.py`.
+Most effects have a second form, for robots whose drag, say, is not quadratic: it acts where the parameter `form` is not
+zero (`protocol/robots.FORMS`). `OUTSIDE` are effects that no catalogue lists; later ones are in `outside.py`.
 """
 
 import numpy as np
 
-from . import batch_outside as outside
-from .batch_camera import report
-from .batch_input import arriving, delays, pair, polled, pushed, sent_commands
+from . import outside
+from .camera import report
+from .commands import arriving, delays, pair, polled, pushed, sent_commands
 
 SUBSTEPS, RUBBING, SWEEPS = 16, 64, 8
 """Substeps per row, those of runs with dry friction, and sweeps over the two wheels' frictions."""

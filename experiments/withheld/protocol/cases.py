@@ -8,8 +8,9 @@ import numpy as np
 
 from jaxident.effects import CATALOGUE
 
-from . import batch_robot, outside, robots
-from .batch_camera import frozen
+from ..batch_robot.camera import frozen
+from ..batch_robot.simulate import simulate
+from . import outside, robots
 
 SCHEMA = "withheld.answers/1"
 RUNS, SIM_RUNS, ROWS = 6, 3, 1001
@@ -120,7 +121,7 @@ def simulate_runs(runs: list[dict]) -> list[np.ndarray]:
     """Logs (rows, 6) of runs of equal length, in one batch; without generators nothing in it happens by chance."""
     rngs = [run["rng"] for run in runs]
     period = np.array([run["period"] for run in runs])
-    poses = batch_robot.simulate(
+    poses = simulate(
         [run["robot"] for run in runs],
         [run["effects"] for run in runs],
         period,

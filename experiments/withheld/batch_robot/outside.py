@@ -1,11 +1,11 @@
-"""Later effects that no catalogue lists, for `batch_robot`: plain NumPy, one column per run.
+"""Later effects that no catalogue lists, in plain NumPy, one column per run.
 
 Each is in the parameters `p` only where some run has it: what has none of them is simulated as before.
 """
 
 import numpy as np
 
-from .batch_input import pair
+from .commands import pair
 
 LATER: dict[str, dict[str, float]] = {
     "castor_kick": {"kick": 0.0, "fade": 0.2},  # w' += c s exp(-t / fade), t since v turned to the sign s

@@ -1,0 +1,1 @@
+"""Simpler ways to name an effect, scored by the same table."""

@@ -1,0 +1,1 @@
+"""A differential-drive robot in the physics engine MuJoCo (extra `mujoco`)."""

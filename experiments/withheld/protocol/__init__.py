@@ -1,0 +1,1 @@
+"""Cases: what is drawn, how it is sealed, how it is diagnosed."""
