@@ -107,10 +107,12 @@ def _told(found) -> list[str]:
     """What the terminal says of a diagnosis."""
     from jaxident.report.account import account_lines, plain_text
     from jaxident.report.discovered import sentence
+    from jaxident.report.lead import refusal
 
     lines = account_lines(found.account)
     lines.append(f"verdict: {SENTENCE[found.verdict].format(effects=' and '.join(found.selected))}")
     lines += [f"discovered: {plain_text(sentence(shown))}" for shown in found.discovered]
+    lines += [f"refused: {told}"] if (told := refusal(found)) else []
     lines += [table([("cause", "takes part", "site"), *_causes(found)]), _gap(found)]
     if found.surplus:
         lines.append(f"your simulator has, and the robot has not: {', '.join(found.surplus)}")

@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 from jaxident.diagnosis.account.account import Account
 from jaxident.diagnosis.account.discovered import Shown
-from jaxident.diagnosis.account.measure import Gap, measure
+from jaxident.diagnosis.account.measure import Gap, Measured, measure
 from jaxident.diagnosis.account.models import as_model
+from jaxident.diagnosis.account.refused import finding_without
 from jaxident.diagnosis.account.shrink import Shrink
 from jaxident.diagnosis.account.where import Place
 from jaxident.diagnosis.causes.chance_effects import direct_effects, direct_evidence, present
@@ -46,7 +47,9 @@ class Diagnosis(NamedTuple):
     the named effects, in the order in which they were accepted. visible: the gain that each effect of typical size
     would have had; below CLAIMED this input could not have shown it. replay: what faint effects come out as. surplus:
     effects that the user's simulator has and the robot has not. discovered: laws in no catalogue, which the corrected
-    model has as well. suspicions: what the log says against itself, with the option that mends it, a line each."""
+    model has as well. suspicions: what the log says against itself, with the option that mends it, a line each.
+    refused: effects that fit the runs for naming and made the prediction of the judging runs surely worse: no model has
+    them."""
 
     verdict: str
     judgement: Judgement
@@ -67,6 +70,7 @@ class Diagnosis(NamedTuple):
     simulator: Simulator | None = None
     discovered: tuple[Shown, ...] = ()
     suspicions: tuple[str, ...] = ()
+    refused: tuple[str, ...] = ()
 
     @property
     def not_testable(self) -> list[str]:
@@ -95,15 +99,10 @@ def diagnose(
     prepared, finding = find_effects(prepare(logs, horizon, None if simulator is None else simulator.vector[:10]))
     if sim is not None:
         simulator, finding = inspect_simulator(sim, prepared, finding)
+    (finding, extra, shown, measured), refused = believed(prepared, finding, simulator, model, seed)
+    gap, account, where, shrinks, corrected, laws, _ = measured
     told = None if simulator is None else simulator.vector
-    extra = direct_evidence(prepared, finding, CLAIMED if simulator is None else simulator.price)
-    shown = present(finding, extra)
     common, surplus = shared(shown, simulator)
-    direct = direct_effects(prepared, finding, shown)
-    given = None if simulator is None else as_model(prepared, simulator.vector, finding.law, simulator.effects, direct)
-    if given is not None and model is not None:
-        given = dataclasses.replace(given, discovered=model.discovered)
-    gap, account, where, shrinks, corrected, laws = measure(prepared, finding, given, common, direct, seed)
     judgement = judge(finding, gap, extra, simulator)
     selected = tuple(name for name in shown if name not in common) if judgement.none < 0.5 else ()
     known = answers(finding.data, finding.nominal, prepared.largest)
@@ -112,7 +111,42 @@ def diagnose(
     nominal = to_model(prepared, finding.nominal.vector, finding.law, (), None, finding.nominal)
     return Diagnosis(verdict, judgement, gap, account, where, selected, parameters, visible(known), replay(known, seed),
                      advice(verdict, judgement, laws), nominal, corrected, shrinks, prepared, finding, surplus,
-                     simulator, laws, (*log_suspicions(join(logs)), *suspected_wheels(join(logs))))  # fmt: skip
+                     simulator, laws, (*log_suspicions(join(logs)), *suspected_wheels(join(logs))),
+                     refused)  # fmt: skip
+
+
+class Seen(NamedTuple):
+    """What the judging rows say of a finding: the evidence of effects that show without a refit, all effects present,
+    and what is measured of them."""
+
+    finding: Finding
+    extra: dict[str, float]
+    shown: tuple[str, ...]
+    measured: Measured
+
+
+def believed(
+    prepared: Prepared, finding: Finding, simulator: Simulator | None, model: Model | None, seed: int
+) -> tuple[Seen, tuple[str, ...]]:
+    """A finding on the rows kept for judging, without the effects that these rows refuse; and those."""
+    refused: tuple[str, ...] = ()
+    seen = see(prepared, finding, simulator, model, seed)
+    while more := seen.measured.refused:
+        refused = (*refused, *more)
+        seen = see(prepared, finding_without(seen.finding, more), simulator, model, seed)
+    return seen, refused
+
+
+def see(prepared: Prepared, finding: Finding, simulator: Simulator | None, model: Model | None, seed: int) -> Seen:
+    """A finding on the rows kept for judging. `model`: the nominal model where one was given."""
+    extra = direct_evidence(prepared, finding, CLAIMED if simulator is None else simulator.price)
+    shown = present(finding, extra)
+    common, _ = shared(shown, simulator)
+    direct = direct_effects(prepared, finding, shown)
+    given = None if simulator is None else as_model(prepared, simulator.vector, finding.law, simulator.effects, direct)
+    if given is not None and model is not None:
+        given = dataclasses.replace(given, discovered=model.discovered)
+    return Seen(finding, extra, shown, measure(prepared, finding, given, common, direct, seed))
 
 
 def check_nominal(logs: Log | Sequence[Log], sim: Log | Sequence[Log] | None, model: Model | None) -> None:

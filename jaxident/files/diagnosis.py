@@ -36,6 +36,7 @@ def diagnosis_to_dict(found: Diagnosis) -> dict[str, Any]:
         },
         "causes": _causes(found),
         "selected": list(found.selected),
+        "refused": list(found.refused),
         "discovered": [_law(one) for one in found.discovered] or None,
         "surplus": list(found.surplus),
         "parameters": [p._asdict() for p in found.parameters],

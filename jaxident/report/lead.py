@@ -12,8 +12,21 @@ CLEAREST = 3
 
 
 def lead(found: Diagnosis) -> str:
-    """The verdict in a few sentences, and what was discovered in one."""
-    return f"{_verdict(found)}{_discovered(found)}"
+    """The verdict in a few sentences, what was discovered in one, and what was refused in one."""
+    refused = f" {told}" if (told := refusal(found)) else ""
+    return f"{_verdict(found)}{_discovered(found)}{refused}"
+
+
+def refusal(found: Diagnosis) -> str:
+    """Effects that the judging runs refuse, in a sentence; nothing where there are none."""
+    if not found.refused:
+        return ""
+    names, one = together(found.refused), len(found.refused) == 1
+    fit, it = ("fits", "it") if one else ("fit", "them")
+    return (
+        f"{names[0].upper()}{names[1:]} {fit} the runs for naming, but a model with {it} predicts the runs kept for "
+        f"judging worse (95 % surely): the corrected model is without {it}."
+    )
 
 
 def _discovered(found: Diagnosis) -> str:

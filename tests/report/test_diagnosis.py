@@ -228,3 +228,10 @@ def test_discovered_laws_have_a_section_a_picture_and_a_sentence():
     blocks = section(page, "What was discovered").blocks
     assert any(isinstance(block, Figure) and block.png for block in blocks)
     assert "with discovered laws" in str(section(page, "How large the gap is").blocks)
+
+
+def test_what_the_judging_runs_refuse_is_told_in_a_sentence():
+    assert "kept for judging worse" not in lead(made_up("partly"))
+    told = lead(made_up("unknown")._replace(refused=("quadratic_drag", "backlash")))
+    assert "Quadratic drag and backlash fit the runs for naming, but a model with them predicts" in told
+    assert told.endswith("the corrected model is without them.")

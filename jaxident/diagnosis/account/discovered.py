@@ -3,12 +3,11 @@
 import dataclasses
 from typing import NamedTuple
 
-import numpy as np
-
 from jaxident.array_types import Array
 from jaxident.diagnosis.account.judging import Judged, judge_model
 from jaxident.diagnosis.account.models import Corrected, corrected_of
-from jaxident.diagnosis.account.shrink import LOW, RESAMPLES, blocks
+from jaxident.diagnosis.account.refused import taken
+from jaxident.diagnosis.account.shrink import LOW
 from jaxident.diagnosis.account.sized import beside, sized_corrected
 from jaxident.diagnosis.causes.finding import Finding
 from jaxident.diagnosis.discovery.candidates import Kind
@@ -69,7 +68,7 @@ def confirm(prepared: Prepared, finding: Finding, direct: dict, seed: int, plain
         unit = deviations(whole.law) ** 2
         steps = [*steps, judge_model(whole.model, prepared)]
         (share, p_value), (more, _) = (
-            _taken(before, steps[-1], steps[0].error ** 2 / unit, unit, seed) for before in (steps[0], steps[-2])
+            taken(before, steps[-1], steps[0].error ** 2 / unit, unit, seed) for before in (steps[0], steps[-2])
         )
         if min(share, more) > 0.0 and p_value < LOW:
             named = corrected_of(prepared, finding, whole.law, direct)
@@ -82,22 +81,11 @@ def each_law(prepared: Prepared, found: Confirmed, total: Array, unit: Array, se
     squares of the refitted nominal model over the camera's variances `unit` (3,)."""
     shown = []
     for curve, before, after in zip(found.bending.curves, found.steps[:-1], found.steps[1:], strict=True):
-        share, p_value = _taken(before, after, total, unit, seed)
+        share, p_value = taken(before, after, total, unit, seed)
         law = as_law(curve, prepared.largest)
         density = tuple(map(int, curve.density))
         shown.append(Shown(curve.kind, law, density, share, p_value, form_of(law, density)))
     return tuple(shown)
-
-
-def _taken(before: Judged, after: Judged, total: Array, unit: Array, seed: int) -> tuple[float, float]:
-    """The share of the total that one model takes away from another's error, and how likely it takes none."""
-    gained, whole = np.mean((before.error**2 - after.error**2) / unit, axis=1), np.mean(total, axis=1)
-    kept = np.isfinite(gained) & np.isfinite(whole)
-    if not kept.any() or not np.isfinite(after.error[np.isfinite(before.error)]).all():
-        return 0.0, 1.0
-    gained, whole = gained[kept], whole[kept]
-    drawn = gained[blocks(np.random.default_rng(seed), len(gained), RESAMPLES)].mean(axis=1)
-    return float(gained.mean() / whole.mean()), float(np.mean(drawn <= 0.0))
 
 
 def _plain(model: Model) -> Model:

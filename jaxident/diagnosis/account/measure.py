@@ -12,6 +12,7 @@ from jaxident.diagnosis.account.discovered import Shown, confirm, each_law
 from jaxident.diagnosis.account.floor import Floor, floor_of
 from jaxident.diagnosis.account.judging import Judged, judge_model
 from jaxident.diagnosis.account.models import placebo_of, players_of, with_players, without
+from jaxident.diagnosis.account.refused import refused
 from jaxident.diagnosis.account.shrink import HIGH, LOW, Shrink, interval, shrink_of
 from jaxident.diagnosis.account.sized import REPLAYS, sized_corrected
 from jaxident.diagnosis.account.where import Place, increments, locate
@@ -73,7 +74,8 @@ def _root(squares: Array) -> float:
 
 
 class Measured(NamedTuple):
-    """All that the judging rows tell, the corrected model of which they tell it, and the laws that were discovered."""
+    """All that the judging rows tell, the corrected model of which they tell it, the laws that were discovered, and
+    named effects that these rows refuse."""
 
     gap: Gap
     account: Account
@@ -81,6 +83,7 @@ class Measured(NamedTuple):
     shrinks: dict[str, Shrink]
     model: Model
     discovered: tuple[Shown, ...]
+    refused: tuple[str, ...]
 
 
 def measure(prepared: Prepared, finding: Finding, given: Model | None, common, direct: dict, seed: int = 0) -> Measured:
@@ -96,8 +99,7 @@ def measure(prepared: Prepared, finding: Finding, given: Model | None, common, d
         joined: judge_model(model, prepared) for joined, model in with_players(prepared, finding, corrected, players)
     }
     nobody, everybody = judged[frozenset()], judged[frozenset(players)]
-    noise = corrected.model.noise
-    before = nobody if given is None else judge_model(dataclasses.replace(given, noise=noise), prepared)
+    before = nobody if given is None else judge_model(dataclasses.replace(given, noise=corrected.model.noise), prepared)
     floor = floor_of(corrected.model, everybody, prepared, law, draws)
     unit, last = deviations(law) ** 2, everybody if shown is None else shown.judged
     missed = {joined: one.error for joined, one in judged.items()}
@@ -111,8 +113,8 @@ def measure(prepared: Prepared, finding: Finding, given: Model | None, common, d
         return shrink_of(errors[1], model.error**2 / unit, level, floor.draws, _wander(model, unit, seed), seed, least)
 
     shrinks = {name: shrink(judged[frozenset({name})]) for name in players}
-    name, idle = placebo_of(prepared, finding, law)
-    placebo = (name, shrink(judge_model(idle, prepared)))
+    weakest, idle = placebo_of(prepared, finding, law)
+    placebo = (weakest, shrink(judge_model(idle, prepared)))
     low, high = (float(q) for q in np.quantile(floor.likely, [LOW, HIGH]))
     gap = Gap(prepared.horizon, *_levels(errors), level, (low, high), shrink(everybody), placebo, errors, floor, unit,
               int(last.run_up.sum()))  # fmt: skip
@@ -121,7 +123,8 @@ def measure(prepared: Prepared, finding: Finding, given: Model | None, common, d
         moved = _moved(everybody, judge_model(without(bare, players), prepared), unit)
     place = locate(errors[1], floor.total / unit, everybody.path, prepared, moved, seed)
     laws = () if shown is None else each_law(prepared, shown, errors[1], unit, seed)
-    return Measured(gap, account, place, shrinks, corrected.model if shown is None else shown.model, laws)
+    return Measured(gap, account, place, shrinks, corrected.model if shown is None else shown.model, laws,
+                    refused(judged, players, last, unit, seed))  # fmt: skip
 
 
 def _levels(errors: Array) -> tuple[float, float, float, float]:
