@@ -113,6 +113,13 @@ def test_inner_rooms_stand_in_a_row(house):
     assert not found, "\n".join(found)
 
 
+@pytest.mark.parametrize("house", ROWS)
+def test_tests_have_the_same_inner_rooms(house):
+    tests = PACKAGE.parent / "tests" / house
+    folders = {path.parent.name for path in tests.glob("*/test_*.py")}
+    assert folders == set(" ".join(ROWS[house]).split())
+
+
 def test_imports_run_in_no_circle():
     graphlib.TopologicalSorter(GRAPH).prepare()
 

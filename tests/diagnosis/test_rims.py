@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from support.small_robot import ROWS, RUNS, STEP, VECTOR, robot_with
 
 import jaxident as ji
 from jaxident.diagnosis.causes.finding import find_effects
@@ -21,7 +22,6 @@ from jaxident.effects.coordinates import COORDINATES, PLACES, STEPPED, sizes
 from jaxident.log import join, make_log
 from jaxident.robot.noise import Noise
 from jaxident.robot.wheel_sensor import WheelSensor
-from tests.support.small_robot import ROWS, RUNS, STEP, VECTOR, robot_with
 
 LAW, RADIUS, TRACK, NOISE = Law(2e-4, 2e-3), 0.03, 0.2, 0.02
 AFTER = {"lateral_slip"}

@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from support.diagonal_robot import DEAD_ZONE, DRIVE, PERIOD, logged
 
 from jaxident.array_types import AT_REST, Pose, Wheels
 from jaxident.errors import InputError
@@ -16,16 +17,12 @@ from jaxident.estimation.poses.parameters import Law, Robot, bounds, from_vector
 from jaxident.estimation.poses.runs import Runs, stack_runs
 from jaxident.estimation.poses.scoring import Point, _general_local, _white_local, local_at
 from jaxident.estimation.uncertainty.precision import bound_covariance, natural_values
-from jaxident.log import Log, make_log
-from jaxident.robot.drive import Physical
+from jaxident.log import make_log
 from jaxident.robot.excitation import EXCITATIONS
 from jaxident.robot.model import Model
 from jaxident.robot.noise import Noise, draw_noise, observe
-from jaxident.robot.simulate import run_physical, simulate
+from jaxident.robot.simulate import run_physical
 
-PERIOD = 1.0 / 30.0
-DRIVE = Physical(np.array([0.541386, 7.817043]), np.array([[0.128988, 0.127287], [66.824208, -65.25288]]))
-DEAD_ZONE = np.array([0.25, 0.2])
 D_MAX = 0.9
 
 
@@ -37,15 +34,6 @@ def simulated(key, name, noise, rows=1000):
     pose = observe(state.pose, noise, unit, jnp.asarray(PERIOD))
     seen = jnp.ones((1, rows), bool)
     return Runs(jnp.asarray(PERIOD), Wheels(*(u[None] for u in command)), Pose(*(c[None] for c in pose)), seen)
-
-
-def logged(seed, noise=None, rows=300, jitter=0.0):
-    """A log of the diagonal robot; jitter is the relative spread of the steps."""
-    command = EXCITATIONS["multilevel"](jax.random.key(seed), rows, hold=10)
-    step = PERIOD * (1.0 + jitter * np.random.default_rng(seed).uniform(-1.0, 1.0, rows))
-    log = make_log(np.cumsum(step), *(np.asarray(u) for u in command))
-    made = simulate(Model(PERIOD, DRIVE, DEAD_ZONE, noise or Noise()), log, key=jax.random.key(100 + seed))
-    return Log(*(np.asarray(column) for column in made))
 
 
 def trials(name, noise, law, count, rows=1000, which=slice(None)):

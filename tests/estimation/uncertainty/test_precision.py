@@ -3,7 +3,7 @@
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from estimation.test_maximum_likelihood import DEAD_ZONE, DRIVE, PERIOD, logged
+from support.diagonal_robot import DEAD_ZONE, DRIVE, PERIOD, logged
 
 from jaxident.array_types import State
 from jaxident.errors import InputError
