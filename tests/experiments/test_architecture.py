@@ -24,3 +24,10 @@ def test_every_file_that_the_page_names_exists():
     names = set(re.findall(r"`((?:jaxident|tests)/[\w/]+\.py)`", text))
     assert len(names) > 10
     assert not [name for name in names if not (ROOT / name).exists()]
+
+
+def test_every_function_that_the_page_names_is_in_its_file():
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    named = re.findall(r"`(jaxident/[\w/]+\.py)`, function `(\w+)`", text)
+    assert len(named) > 6
+    assert not [(file, name) for file, name in named if f"def {name}(" not in (ROOT / file).read_text(encoding="utf-8")]
