@@ -36,8 +36,8 @@ from experiments.diagonal import PERIOD, ROBOT
 from experiments.rows import write_rows
 from jaxident.estimation.poses.maximum_likelihood import fit_runs
 from jaxident.log import Log, join
+from jaxident.parallel import in_parallel
 from jaxident.robot.model import Effect
-from jaxident.study.batch import in_parallel
 from jaxident.study.bench import TRIAL_SAMPLES, trial
 from jaxident.study.engine import BLOCK
 from jaxident.study.synthetic import excite, simulate_runs

@@ -78,7 +78,7 @@ def run_undisturbed(
 ) -> Pose:
     """`run_full` before `disturb`: poses (samples,) as the camera would report them if it made no random error."""
     true = run_states(drive, dead_zone, vector, t, command, start, noise=noise, key=key, session_time=session_time,
-                      substeps=substeps, parts=parts, laws=laws).pose  # fmt: skip
+                      substeps=substeps, parts=parts, laws=laws)[0].pose  # fmt: skip
     settings = with_laws(_settings(vector, parts), laws)
     return shifted(settings, seen(settings, true), true)
 
@@ -97,8 +97,9 @@ def run_states(
     substeps,
     parts,
     laws: Laws | None = None,
-) -> State:
-    """The robot's own states (samples,) of `run_full`. Without `noise` nothing slips at random."""
+) -> tuple[State, Wheels]:
+    """The robot's own states (samples,) of `run_full`, and by how much each wheel turns faster than the ground there,
+    in the unit of commands. Without `noise` nothing slips at random."""
     settings = with_laws(_settings(vector, parts), laws)
     sent = _sent(settings, command, None if key is None else _keys(key))
     grid = _grid(settings, t, sent, session_time, substeps)
@@ -106,8 +107,8 @@ def run_states(
     if key is not None and noise is not None:
         drawn = slip(noise, draw_noise(key, len(t)), jnp.append(jnp.diff(t), 1.0))
         push_aside = Force(*(f[grid.row] for f in drawn))
-    states = _scan(settings, drive, dead_zone, grid, push_aside, start, session_time - t[0])
-    return State(*(column[grid.at_row] for column in states))
+    found = _scan(settings, drive, dead_zone, grid, push_aside, start, session_time - t[0])
+    return jax.tree.map(lambda column: column[grid.at_row], found)
 
 
 def disturb(pose: Pose, vector: Array, t: Array, *, noise: Noise | None, key: Array, parts: frozenset[str]) -> Pose:
@@ -159,8 +160,9 @@ def _moves(settings: Settings) -> bool:
     return bool(settings.keys() & MOVING) or DISCOVERED in settings
 
 
-def _scan(settings, drive, dead_zone, grid: Grid, slips: Force | None, start: State, offset: Array) -> State:
-    """True states (points,) at the points of the grid; `offset` takes times of the log to session times."""
+def _scan(settings, drive, dead_zone, grid: Grid, slips: Force | None, start: State, offset: Array):
+    """True states (points,) at the points of the grid, and by how much each wheel then turns faster than the ground;
+    `offset` takes times of the log to session times."""
     moving = _moves(settings)
     solve = solve_half if moving else hold
     solved = jax.tree.map(grid.spread, solve(drive, grid.step))
@@ -182,11 +184,14 @@ def _scan(settings, drive, dead_zone, grid: Grid, slips: Force | None, start: St
             if shove is not None:
                 pull = Force(pull.along + shove.along, pull.heading + shove.heading)
             after = advance(state, pull, solution)
-        return (after, memory, excess), state
+        return (after, memory, excess), (state, together(excess))
+
+    def together(excess: tuple[Wheels, ...]) -> Wheels:
+        return jax.tree.map(lambda *each: sum(each), Wheels(like, like), *excess)
 
     like = jnp.zeros_like(grid.start, shape=())
     begin = State(*(jnp.asarray(s, like.dtype) for s in start))
     inputs = (grid.start + offset, length, grid.command, slips, grid.changed, solved)
     rolling = tuple(Wheels(like, like) for _ in acting("grip", settings))
-    (last, _, _), states = jax.lax.scan(interval, (begin, at_rest(settings, like), rolling), inputs)
-    return State(*(jnp.append(column, end) for column, end in zip(states, last, strict=True)))
+    (last, _, excess), found = jax.lax.scan(interval, (begin, at_rest(settings, like), rolling), inputs)
+    return jax.tree.map(jnp.append, found, (last, together(excess)))

@@ -10,9 +10,9 @@ from jaxident.effects.catalogue import CATALOGUE, to_vector
 from jaxident.effects.checks import check_delay, check_effects
 from jaxident.effects.discovered import check_discovered, laws_of
 from jaxident.effects.full import run_full, run_states, substeps_for
-from jaxident.errors import InputError
 from jaxident.log import Log
 from jaxident.robot import simulate as nominal
+from jaxident.robot.drive import rim_motion
 from jaxident.robot.model import Model, require_physical
 from jaxident.robot.wheel_sensor import measure_wheels
 
@@ -27,8 +27,8 @@ def simulate(
     of free numerators takes no effects and refuses a log of another or an uneven period. InputError for these, for a
     log of several runs, and for effects that `check_effects` refuses. Differentiable in the model and the start.
 
-    A model with `wheels` gives wheel speeds too, with their noise if there is a key. InputError for one of free
-    numerators, and for an effect under which a wheel slides: how fast it turns then is not simulated.
+    A model with `wheels` gives wheel speeds too, with their noise if there is a key: a wheel that slides turns faster
+    than the ground. InputError for one of free numerators.
 
     Examples:
         >>> import jax, jaxident as ji
@@ -39,7 +39,7 @@ def simulate(
         (300,)
     """
     if model.wheels is not None:
-        _check_wheels(model)
+        require_physical(model)
     if not (model.effects or model.discovered):
         made = nominal.simulate(model, log, start=start, key=key)
         return made if model.wheels is None else _with_wheels(model, made, start, key, session_time)
@@ -63,16 +63,9 @@ def is_random(model: Model) -> bool:
     return any(CATALOGUE[effect.name].random for effect in model.effects)
 
 
-def _check_wheels(model: Model) -> None:
-    require_physical(model)
-    sliding = next((effect.name for effect in model.effects if CATALOGUE[effect.name].stage == "grip"), None)
-    if sliding is not None:
-        raise InputError(f"wheels: under {sliding} a wheel slides, and how fast it turns then is not simulated; leave "
-                         "out the wheel speeds, or the effect")  # fmt: skip
-
-
 def _with_wheels(model: Model, log: Log, start: State, key: Array | None, session_time: Array) -> Log:
-    """The log with the wheel speeds of a model that has the sensor: those of its drive, to which nothing slips."""
+    """The log with the wheel speeds of a model that has the sensor: those of its drive, in which nothing slips at
+    random."""
     parts = frozenset(effect.name for effect in model.effects)
     wheels = _wheels(model.dynamics, model.dead_zone, to_vector(model.effects), log, start, key, session_time,
                      laws_of(model.discovered), model.wheels, substeps=substeps_for(parts), parts=parts)  # fmt: skip
@@ -81,9 +74,9 @@ def _with_wheels(model: Model, log: Log, start: State, key: Array | None, sessio
 
 @partial(jax.jit, static_argnames=("substeps", "parts"))
 def _wheels(drive, dead_zone, vector, log: Log, start, key, session_time, laws, sensor, *, substeps, parts) -> Wheels:
-    states = run_states(drive, dead_zone, vector, log.t, log.command, start, noise=None, key=key,
-                        session_time=session_time, substeps=substeps, parts=parts, laws=laws)  # fmt: skip
-    return measure_wheels(sensor, states.v, states.w, key)
+    states, excess = run_states(drive, dead_zone, vector, log.t, log.command, start, noise=None, key=key,
+                                session_time=session_time, substeps=substeps, parts=parts, laws=laws)  # fmt: skip
+    return measure_wheels(sensor, *rim_motion(drive, states.v, states.w, excess), key)
 
 
 @partial(jax.jit, static_argnames=("substeps", "parts"))

@@ -84,6 +84,13 @@ def wheel_speeds(drive: Physical, v: Array, w: Array) -> Wheels:
     return to_wheels(drive, drive.rate[0] * v, drive.rate[1] * w)
 
 
+def rim_motion(drive: Physical, v: Array, w: Array, excess: Wheels) -> tuple[Array, Array]:
+    """Speed [m/s] and turn rate [rad/s] that the rims of both wheels have at a robot's own: those of the robot, and
+    what wheels turn faster than the ground (`excess`, in the unit of the command that holds a wheel's speed)."""
+    faster = force(drive, excess)
+    return v + faster.along / drive.rate[0], w + faster.heading / drive.rate[1]
+
+
 def hold(physical: Physical, step: Array) -> Hold:
     """The exact solution over a step [s]; a step of shape (samples,) gives weights (samples,), one set per row."""
     *nodes, (v, w, turn) = responses(physical, step, (*GAUSS_NODES, 1.0))

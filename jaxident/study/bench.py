@@ -18,13 +18,13 @@ from jaxident.estimation.poses.runs import Runs
 from jaxident.log import Log, make_log
 from jaxident.numerics import require_float64
 from jaxident.origin import versions
+from jaxident.parallel import in_parallel
 from jaxident.robot.drive import Physical
 from jaxident.robot.excitation import multilevel
 from jaxident.robot.model import Model, difference_vector, require_physical
 from jaxident.robot.noise import Noise, draw_noise, observe
 from jaxident.robot.path_length import path_length
 from jaxident.robot.simulate import run_physical
-from jaxident.study.batch import in_parallel
 
 TRIALS, SAMPLES = 1024, 2000
 TRIAL_SAMPLES, SETUP_ROWS, D_MAX = 1000, 200, 0.9

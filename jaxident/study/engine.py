@@ -12,9 +12,9 @@ import numpy as np
 from jaxident.array_types import Wheels
 from jaxident.effects.catalogue import to_vector
 from jaxident.numerics import require_float64
+from jaxident.parallel import in_parallel
 from jaxident.robot.excitation import EXCITATIONS
 from jaxident.robot.model import require_physical
-from jaxident.study.batch import in_parallel
 from jaxident.study.design import PARTS, Study
 from jaxident.study.estimators import runs_alone
 from jaxident.study.trial import Cell, Outcome, Plan, Recording, Robot, commands, record, run_trial

@@ -33,17 +33,17 @@ def refused(
     judged: Mapping[frozenset[str], Judged], players: tuple[str, ...], last: Judged, unit: Array, seed: int
 ) -> tuple[str, ...]:
     """Effects of `players` without which the judging rows are predicted better, 95 % surely: while a smaller set
-    does, the best of such sets is taken. `last`: how the model with all of them, and discovered laws, does. Lost
-    commands stay: single jumps of the command show them."""
+    does, the largest of such sets is taken, and of equally large ones the best. `last`: how the model with all of them,
+    and discovered laws, does. Lost commands stay: single jumps of the command show them."""
     kept, now = frozenset(players), last
     while True:
         surely = []
         for fewer in (each for each in judged if each < kept and LOST not in kept - each):
             share, p_value = taken(now, judged[fewer], now.error**2 / unit, unit, seed)
-            surely += [(share, fewer)] if p_value < LOW else []
+            surely += [(len(fewer), share, fewer)] if p_value < LOW else []
         if not surely:
             return tuple(name for name in players if name not in kept)
-        kept = max(surely, key=lambda pair: pair[0])[1]
+        kept = max(surely, key=lambda each: each[:2])[2]
         now = judged[kept]
 
 

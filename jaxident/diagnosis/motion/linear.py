@@ -19,6 +19,7 @@ from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.coordinates import BY_DRIVE, NOMINAL, PLACES, limits, sizes
 from jaxident.effects.discovered import Laws
 from jaxident.effects.fast_input import PUSHING
+from jaxident.parallel import in_parallel
 
 START_STATES = 5
 PART = 1e-5
@@ -54,18 +55,18 @@ _PUSHING = [6, 7, *(place for (name, _), place in PLACES.items() if name in PUSH
 def follow(vectors: Array, starts: Array, windows: Windows, laws: Laws | None = None) -> np.ndarray:
     """Residuals (batch, windows, numbers) at vectors (batch, SIZE) and starts (batch, 5, windows).
 
-    One vector after the other: more lanes of one program run no faster, and vectors that drive the wheels alike, as
-    most columns of a linearisation do, share what costs most. Wheels that coast in their play are driven alike by equal
-    drives only.
+    One vector a core: more lanes of one program run no faster, and vectors that drive the wheels alike, as most columns
+    of a linearisation do, share what costs most. Wheels that coast in their play are driven alike by equal drives
+    only.
     """
     windows = jax.tree.map(jnp.asarray, windows)
     driven = vectors[:, _PUSHING]
     if np.any(vectors[:, _BY_DRIVE] > 0.0):
         driven = np.concatenate([driven, vectors[:, : len(NOMINAL)]], axis=1)
     _, first, own = np.unique(driven, axis=0, return_index=True, return_inverse=True)
-    push = [_pushed(vectors[k], windows) for k in first]
-    found = [_moved(*pair, push[k], windows, laws) for *pair, k in zip(vectors, starts, own.ravel(), strict=True)]
-    whole = np.stack([np.asarray(one) for one in found])
+    push = in_parallel(_pushed, [(vectors[k], windows) for k in first], ahead=False)
+    lanes = [(*pair, push[k], windows, laws) for *pair, k in zip(vectors, starts, own.ravel(), strict=True)]
+    whole = np.stack([np.asarray(one) for one in in_parallel(_moved, lanes, ahead=False)])
     return whole.transpose(0, 2, 1, 3).reshape(len(whole), whole.shape[2], -1)
 
 

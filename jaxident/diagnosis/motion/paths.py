@@ -3,13 +3,14 @@
 import jax
 import jax.numpy as jnp
 
-from jaxident.array_types import Array, Pose, State
+from jaxident.array_types import Array, Pose, State, Wheels
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.coordinates import by_effect
 from jaxident.effects.discovered import Laws, with_laws
 from jaxident.effects.fast_input import SUBSTEPS, Push, pushes
 from jaxident.effects.fast_motion import Row, advance_row, drive_of, lags_of, report, rolling
 from jaxident.numerics import wrap
+from jaxident.robot.drive import rim_motion
 
 
 def residuals(vector: Array, starts: Array, push: Push, windows: Windows, laws: Laws | None = None) -> Array:
@@ -47,10 +48,7 @@ def rolled(vector: Array, starts: Array, push: Push, windows: Windows, laws: Law
     """Speed [m/s] and turn rate [rad/s] (rows, windows) that the rims of both wheels have: those of the robot, and what
     wheels that slide turn faster than the ground."""
     states, excess = _moved(vector, starts, push, windows, laws)
-    drive = drive_of(vector)
-    right, left = sum(excess[0::2]), sum(excess[1::2])
-    faster = [(row[0] * right + row[1] * left) / rate for row, rate in zip(drive.gain, drive.rate, strict=True)]
-    return states.v + faster[0], states.w + faster[1]
+    return rim_motion(drive_of(vector), states.v, states.w, Wheels(sum(excess[0::2]), sum(excess[1::2])))
 
 
 def _moved(vector: Array, starts: Array, push: Push, windows: Windows, laws: Laws | None) -> tuple[State, list]:

@@ -17,6 +17,7 @@ from jaxident.diagnosis.motion.paths import push_of, rolled
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.discovered import Laws
 from jaxident.estimation.poses.wheel_colour import samples_each
+from jaxident.parallel import in_parallel
 
 SAME = 1e-6
 """Part of a direction's length below which it is a copy of another one."""
@@ -57,7 +58,9 @@ def rim_speeds(vectors: Array, starts: Array, windows: Windows, laws: Laws | Non
     """Speed [m/s] and turn rate [rad/s] of the rims (batch, windows, numbers) at vectors (batch, SIZE) and starts
     (batch, 5, windows)."""
     windows = jax.tree.map(jnp.asarray, windows)
-    found = [_rolled(v, s, _pushed(v, windows), windows, laws) for v, s in zip(vectors, starts, strict=True)]
+    push = in_parallel(_pushed, [(vector, windows) for vector in vectors], ahead=False)
+    lanes = [(*each, windows, laws) for each in zip(vectors, starts, push, strict=True)]
+    found = in_parallel(_rolled, lanes, ahead=False)
     return np.stack([np.concatenate([np.asarray(v).T, np.asarray(w).T], axis=1) for v, w in found])
 
 

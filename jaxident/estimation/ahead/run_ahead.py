@@ -18,6 +18,7 @@ from jaxident.estimation.ahead.parameter_spread import directions
 from jaxident.estimation.ahead.stretches import AXES, Starts, cut_stretches, until_last_start
 from jaxident.estimation.increments.observations import blind, repeats
 from jaxident.log import Log
+from jaxident.parallel import in_parallel
 from jaxident.robot.model import Model
 from jaxident.robot.noise import Noise
 
@@ -107,14 +108,14 @@ _run_block = jax.jit(filter_and_run)
 def _in_blocks(vector: Array, laws: Laws | None, noise: Noise, lost: float | None, stretch: Stretch, first: int) -> Run:
     """`filter_and_run` of any number of stretches; the last block is filled up with copies of its last one.
 
-    All blocks are sent off before any is waited for: they run side by side where there are cores."""
+    Blocks run side by side where there are cores."""
     count = stretch.t.shape[1]
-    size, sent = next((n for n in LANES if n >= count), LANES[-1]), []
+    size, blocks = next((n for n in LANES if n >= count), LANES[-1]), []
     for begin in range(0, count, size):
         chosen = np.minimum(np.arange(begin, begin + size), count - 1)
         block = Stretch(*(
             np.take(leaf, chosen, axis=axis) for leaf, axis in zip(stretch, AXES, strict=True)
         ))  # fmt: skip
-        sent.append(_run_block(vector, laws, noise, lost, block, first))
-    parts = [jax.tree.map(np.asarray, block) for block in sent]
+        blocks.append((vector, laws, noise, lost, block, first))
+    parts = [jax.tree.map(np.asarray, block) for block in in_parallel(_run_block, blocks, ahead=False)]
     return Run(*(np.concatenate(leaves, axis=-1)[..., :count] for leaves in zip(*parts, strict=True)))

@@ -46,6 +46,12 @@ def test_two_that_cancel_go_together():
     assert refused(models, ("a", "b"), models[frozenset("ab")], UNIT, 0) == ("a", "b")
 
 
+def test_as_few_effects_go_as_need_be():
+    """None at all is best here by a little, and not surely better than `a` alone."""
+    models = table("ab", none=1.98, a=2.0, b=9.0, ab=3.0)
+    assert refused(models, ("a", "b"), models[frozenset("ab")], UNIT, 0) == ("b",)
+
+
 def test_what_is_worse_by_chance_alone_stays():
     models = table("a", none=1.0, a=1.02)
     assert refused(models, ("a",), models[frozenset("a")], UNIT, 0) == ()

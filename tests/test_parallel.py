@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxident.study.batch import in_parallel
+from jaxident.parallel import in_parallel
 
 
 def test_blocks_in_parallel_are_the_loop_in_order():
@@ -14,3 +14,10 @@ def test_blocks_in_parallel_are_the_loop_in_order():
         np.testing.assert_array_equal(found["sum"], block[0] + block[1])
         np.testing.assert_array_equal(found["product"], block[0] * block[1])
     assert function._cache_size() == 1
+
+
+def test_a_function_that_is_not_compiled_yet_is_compiled_once():
+    function = jax.jit(lambda a: jnp.sort(a) * 2.0)
+    found = in_parallel(function, [(jnp.arange(3.0) - k,) for k in range(9)], 4, ahead=False)
+    assert function._cache_size() == 1
+    np.testing.assert_array_equal(found, [2.0 * (np.arange(3.0) - k) for k in range(9)])
