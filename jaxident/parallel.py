@@ -18,9 +18,13 @@ def in_parallel(
     another: results are the same to the bit with any number of threads. `ahead`: whether the function is compiled
     already. If not, the first block runs alone: threads that come first would each compile it.
     """
-    alone = list(blocks[:0] if ahead else blocks[:1])
-    first = [jax.block_until_ready(function(*block)) for block in alone]
-    if len(blocks) - len(alone) < 2:
-        return first + [jax.block_until_ready(function(*block)) for block in blocks[len(alone) :]]
+
+    def run(block: tuple[Any, ...]) -> Any:
+        return jax.block_until_ready(function(*block))
+
+    alone = 0 if ahead else 1
+    first, others = [run(block) for block in blocks[:alone]], blocks[alone:]
+    if len(others) < 2:  # threads would only cost
+        return first + [run(block) for block in others]
     with ThreadPoolExecutor(cores or os.cpu_count()) as threads:
-        return first + list(threads.map(lambda block: jax.block_until_ready(function(*block)), blocks[len(alone) :]))
+        return first + list(threads.map(run, others))

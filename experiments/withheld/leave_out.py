@@ -12,10 +12,8 @@ import json
 import pathlib
 
 import jaxident as ji
-from jaxident.diagnosis.account.measure import measure
-from jaxident.diagnosis.causes.chance_effects import direct_effects, direct_evidence, present
 from jaxident.diagnosis.causes.finding import find_effects
-from jaxident.diagnosis.diagnose import decide
+from jaxident.diagnosis.diagnose import believed, decide
 from jaxident.diagnosis.posterior import judge
 from jaxident.diagnosis.preparation.prepare import prepare
 from jaxident.effects import CATALOGUE
@@ -49,10 +47,8 @@ def without(case: pathlib.Path, effect: str) -> dict:
     """Verdict, what was named, and whether the most probable site is that of the effect that was left out."""
     logs = [ji.read_log(path) for path in sorted(case.glob("real_*"))]
     prepared, finding = find_effects(prepare(logs, None), without=(effect,))
-    extra = direct_evidence(prepared, finding)
-    shown = present(finding, extra)
-    gap = measure(prepared, finding, None, (), direct_effects(prepared, finding, shown)).gap
-    judgement = judge(finding, gap, extra)
+    (finding, extra, shown, measured), _ = believed(prepared, finding, None, None, 0)
+    judgement = judge(finding, measured.gap, extra)
     verdict = decide(prepared, judgement, shown if judgement.none < 0.5 else (), [])
     site = max(judgement.sites, key=judgement.sites.__getitem__)
     right = CATALOGUE[effect].site

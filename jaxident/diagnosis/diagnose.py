@@ -48,8 +48,8 @@ class Diagnosis(NamedTuple):
     would have had; below CLAIMED this input could not have shown it. replay: what faint effects come out as. surplus:
     effects that the user's simulator has and the robot has not. discovered: laws in no catalogue, which the corrected
     model has as well. suspicions: what the log says against itself, with the option that mends it, a line each.
-    refused: effects that fit the runs for naming and made the prediction of the judging runs surely worse: no model has
-    them."""
+    refused: effects that fit the runs for naming, and without which the judging runs are predicted better (95 % sure);
+    the corrected model has none of them."""
 
     verdict: str
     judgement: Judgement
@@ -128,7 +128,8 @@ class Seen(NamedTuple):
 def believed(
     prepared: Prepared, finding: Finding, simulator: Simulator | None, model: Model | None, seed: int
 ) -> tuple[Seen, tuple[str, ...]]:
-    """A finding on the rows kept for judging, without the effects that these rows refuse; and those."""
+    """A finding measured on the rows kept for judging, and the effects that these rows refuse: while there are some,
+    it is measured again without them."""
     refused: tuple[str, ...] = ()
     seen = see(prepared, finding, simulator, model, seed)
     while more := seen.measured.refused:

@@ -62,7 +62,8 @@ def lost_push(push: Array, yielded: Array, limit: Array, dry: Array, sliding: Sk
 
 
 def _slide(excess, start, middle, step, limit, dry, spin) -> Skid:
-    return skid(excess, start, middle, step, limit, spin)
+    """A tyre that only yields, or motors without more current, let no wheel slide."""
+    return skid(excess, start, middle, step, jnp.where(dry > 0.0, limit, jnp.inf), spin)
 
 
 def _lost(push: Array, sliding: Skid, limit: Array, dry: Array, spin: Array) -> Array:
@@ -76,7 +77,7 @@ def _limit(inverse_square: Array) -> Array:
 
 
 def _slide_fast(excess, start, middle, step, inverse_square, dry, spin) -> Skid:
-    return skid(excess, start, middle, step, _limit(inverse_square), spin)
+    return _slide(excess, start, middle, step, _limit(inverse_square), dry, spin)
 
 
 def _lost_fast(push: Array, sliding: Skid, inverse_square: Array, dry: Array, spin: Array) -> Array:

@@ -24,8 +24,8 @@ def refusal(found: Diagnosis) -> str:
     names, one = together(found.refused), len(found.refused) == 1
     fit, it = ("fits", "it") if one else ("fit", "them")
     return (
-        f"{names[0].upper()}{names[1:]} {fit} the runs for naming, but a model with {it} predicts the runs kept for "
-        f"judging worse (95 % surely): the corrected model is without {it}."
+        f"{names[0].upper()}{names[1:]} {fit} the runs for naming, but with {it} the model predicts the runs kept for "
+        f"judging worse (95 % sure). So the corrected model has not got {it}."
     )
 
 

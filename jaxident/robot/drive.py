@@ -85,8 +85,10 @@ def wheel_speeds(drive: Physical, v: Array, w: Array) -> Wheels:
 
 
 def rim_motion(drive: Physical, v: Array, w: Array, excess: Wheels) -> tuple[Array, Array]:
-    """Speed [m/s] and turn rate [rad/s] that the rims of both wheels have at a robot's own: those of the robot, and
-    what wheels turn faster than the ground (`excess`, in the unit of the command that holds a wheel's speed)."""
+    """Speed [m/s] and turn rate [rad/s] of the rims of both wheels, where the robot has v and w: v + (gain e) / rate.
+
+    e, `excess`: by how much each wheel turns faster than the ground, as the command that holds that speed. Coupling is
+    left out, as in `wheel_speeds`. All of one shape."""
     faster = force(drive, excess)
     return v + faster.along / drive.rate[0], w + faster.heading / drive.rate[1]
 

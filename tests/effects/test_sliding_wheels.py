@@ -64,6 +64,16 @@ def test_without_sliding_a_wheel_turns_as_the_robot_rolls():
     np.testing.assert_allclose(limited.wheel_l, free.wheel_l, atol=1e-6)
 
 
+def test_a_tyre_that_only_yields_lets_no_wheel_turn_faster():
+    """Though the command is five times the limit."""
+    command = np.repeat([1.0, -1.0, 0.2], 30)
+    log = make_log(STEP * np.arange(90), command, command)
+    yields = dataclasses.replace(STRAIGHT, effects=(ji.Effect("traction_limit", {"limit": 0.2}),))
+    made = ji.simulate(yields, log)
+    rim, ground = SENSOR.radius * np.asarray(made.wheel_r), np.gradient(np.asarray(made.x), STEP)
+    np.testing.assert_allclose(rim[1:-1], ground[1:-1], atol=0.01)
+
+
 @pytest.mark.parametrize("spin", [0.0, 0.05])
 def test_the_fast_integrator_has_the_same_rims(spin):
     model = sliding(ji.load_model("published"), 0.5, spin)

@@ -233,5 +233,5 @@ def test_discovered_laws_have_a_section_a_picture_and_a_sentence():
 def test_what_the_judging_runs_refuse_is_told_in_a_sentence():
     assert "kept for judging worse" not in lead(made_up("partly"))
     told = lead(made_up("unknown")._replace(refused=("quadratic_drag", "backlash")))
-    assert "Quadratic drag and backlash fit the runs for naming, but a model with them predicts" in told
-    assert told.endswith("the corrected model is without them.")
+    assert "Quadratic drag and backlash fit the runs for naming, but with them the model predicts" in told
+    assert told.endswith("So the corrected model has not got them.")

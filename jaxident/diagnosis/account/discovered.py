@@ -6,8 +6,7 @@ from typing import NamedTuple
 from jaxident.array_types import Array
 from jaxident.diagnosis.account.judging import Judged, judge_model
 from jaxident.diagnosis.account.models import Corrected, corrected_of
-from jaxident.diagnosis.account.refused import taken
-from jaxident.diagnosis.account.shrink import LOW
+from jaxident.diagnosis.account.shrink import LOW, taken
 from jaxident.diagnosis.account.sized import beside, sized_corrected
 from jaxident.diagnosis.causes.finding import Finding
 from jaxident.diagnosis.discovery.candidates import Kind
@@ -68,7 +67,8 @@ def confirm(prepared: Prepared, finding: Finding, direct: dict, seed: int, plain
         unit = deviations(whole.law) ** 2
         steps = [*steps, judge_model(whole.model, prepared)]
         (share, p_value), (more, _) = (
-            taken(before, steps[-1], steps[0].error ** 2 / unit, unit, seed) for before in (steps[0], steps[-2])
+            taken(before.error, steps[-1].error, steps[0].error ** 2 / unit, unit, seed)
+            for before in (steps[0], steps[-2])
         )
         if min(share, more) > 0.0 and p_value < LOW:
             named = corrected_of(prepared, finding, whole.law, direct)
@@ -81,7 +81,7 @@ def each_law(prepared: Prepared, found: Confirmed, total: Array, unit: Array, se
     squares of the refitted nominal model over the camera's variances `unit` (3,)."""
     shown = []
     for curve, before, after in zip(found.bending.curves, found.steps[:-1], found.steps[1:], strict=True):
-        share, p_value = taken(before, after, total, unit, seed)
+        share, p_value = taken(before.error, after.error, total, unit, seed)
         law = as_law(curve, prepared.largest)
         density = tuple(map(int, curve.density))
         shown.append(Shown(curve.kind, law, density, share, p_value, form_of(law, density)))

@@ -60,6 +60,19 @@ def interval(errors: Array) -> tuple[float, float]:
     return float(low), float(high)
 
 
+def taken(before: Array, after: Array, total: Array, unit: Array, seed: int) -> tuple[float, float]:
+    """The share of a total that one model takes away from another's error, and the probability that it takes none.
+    before, after (starts, 3): errors [m, m, rad] of both; unit (3,): the camera's variances; total (starts, 3): squares
+    over these."""
+    gained, whole = np.mean((before**2 - after**2) / unit, axis=1), np.mean(total, axis=1)
+    kept = np.isfinite(gained) & np.isfinite(whole)
+    if not kept.any() or not np.isfinite(after[np.isfinite(before)]).all():
+        return 0.0, 1.0
+    gained, whole = gained[kept], whole[kept]
+    drawn = gained[blocks(np.random.default_rng(seed), len(gained), RESAMPLES)].mean(axis=1)
+    return float(gained.mean() / whole.mean()), float(np.mean(drawn <= 0.0))
+
+
 def blocks(rng, count: int, resamples: int) -> np.ndarray:
     """Resampled places (resamples, count) in blocks."""
     length = min(BLOCK, count)

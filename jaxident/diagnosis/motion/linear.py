@@ -55,9 +55,9 @@ _PUSHING = [6, 7, *(place for (name, _), place in PLACES.items() if name in PUSH
 def follow(vectors: Array, starts: Array, windows: Windows, laws: Laws | None = None) -> np.ndarray:
     """Residuals (batch, windows, numbers) at vectors (batch, SIZE) and starts (batch, 5, windows).
 
-    One vector a core: more lanes of one program run no faster, and vectors that drive the wheels alike, as most columns
-    of a linearisation do, share what costs most. Wheels that coast in their play are driven alike by equal drives
-    only.
+    One program takes one vector, and every core runs a program: a program of more vectors runs no faster. Vectors that
+    drive the wheels alike, as most columns of a linearisation do, share what costs most. Wheels that coast in their
+    play are driven alike by equal drives only.
     """
     windows = jax.tree.map(jnp.asarray, windows)
     driven = vectors[:, _PUSHING]
