@@ -1,6 +1,5 @@
 """What wheel speeds say against themselves: every doubt with its evidence and the option that mends it."""
 
-import dataclasses
 import re
 
 import jax
@@ -129,9 +128,3 @@ def test_identify_leaves_contradicting_wheels_aside_and_says_so(log):
     np.testing.assert_array_equal(found.covariance, alone.covariance)
     paper = ji.identify(log, method="paper")
     assert any("wheel speeds are not used: the method paper" in line for line in paper.suspicions)
-
-
-def test_sliding_wheels_are_not_simulated(log):
-    sliding = dataclasses.replace(ROBOT, effects=(ji.Effect("traction_limit", {"limit": 0.5}),))
-    with pytest.raises(InputError, match="under traction_limit a wheel slides"):
-        ji.simulate(sliding, log)
