@@ -52,7 +52,7 @@ FITS = 5
 SAMPLES = (250, 500, 1000, 2000, 4000, 8000, 16000)
 TRIALS = (100, 1000, 10_000, 100_000)
 REPEATS = 3
-AT_ONCE = BLOCK["cpu"]
+AT_ONCE = BLOCK
 """Trials of a block, as in studies."""
 
 

@@ -1,4 +1,4 @@
-"""Blocks of work that fit the cache, side by side on all cores of this machine."""
+"""Blocks of work that fit the cache of a CPU, side by side on all its cores, or the memory of a card."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -6,6 +6,9 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import jax
+
+SMALLEST_CARD = 2 << 30
+"""Bytes of a card that does not tell its memory: no card that is sold for such work has less."""
 
 
 def in_parallel(
@@ -16,8 +19,11 @@ def in_parallel(
     One thread per core (`cores`: how many, all by default) takes the next block when it is done with one. The program
     is compiled once and releases Python while it runs; no data pass between the blocks, so that none waits for
     another: results are the same to the bit with any number of threads. `ahead`: whether the function is compiled
-    already. If not, the first block runs alone: threads that come first would each compile it.
+    already. If not, the first block runs alone: threads that come first would each compile it. A graphics card takes
+    one block at a time, for each may fill its memory (`trials_at_once`).
     """
+    if cores is None:
+        cores = os.cpu_count() if card_memory() is None else 1
 
     def run(block: tuple[Any, ...]) -> Any:
         return jax.block_until_ready(function(*block))
@@ -26,5 +32,20 @@ def in_parallel(
     first, others = [run(block) for block in blocks[:alone]], blocks[alone:]
     if len(others) < 2:  # threads would only cost
         return first + [run(block) for block in others]
-    with ThreadPoolExecutor(cores or os.cpu_count()) as threads:
+    with ThreadPoolExecutor(cores) as threads:
         return first + list(threads.map(run, others))
+
+
+def card_memory() -> int | None:
+    """Bytes that JAX may use on the smallest graphics card of this process; None where it computes on a CPU."""
+    if jax.default_backend() == "cpu":
+        return None
+    told = [device.memory_stats() or {} for device in jax.local_devices()]
+    return min(stats.get("bytes_limit", SMALLEST_CARD) for stats in told)
+
+
+def trials_at_once(on_cpu: int, bytes_each: float) -> int:
+    """Trials of a block on one device: `on_cpu` of them, which fit the cache, or as many as half of a card's memory
+    holds; `bytes_each`: what one needs there."""
+    memory = card_memory()
+    return on_cpu if memory is None else max(on_cpu, int(0.5 * memory / bytes_each))

@@ -18,7 +18,7 @@ from jaxident.estimation.poses.runs import Runs
 from jaxident.log import Log, make_log
 from jaxident.numerics import require_float64
 from jaxident.origin import versions
-from jaxident.parallel import in_parallel
+from jaxident.parallel import card_memory, in_parallel, trials_at_once
 from jaxident.robot.drive import Physical
 from jaxident.robot.excitation import multilevel
 from jaxident.robot.model import Model, difference_vector, require_physical
@@ -26,25 +26,61 @@ from jaxident.robot.noise import Noise, draw_noise, observe
 from jaxident.robot.path_length import path_length
 from jaxident.robot.simulate import run_physical
 
-TRIALS, SAMPLES = 1024, 2000
-TRIAL_SAMPLES, SETUP_ROWS, D_MAX = 1000, 200, 0.9
+SAMPLES, TRIAL_SAMPLES, SETUP_ROWS, FIT_SAMPLES, D_MAX = 2000, 1000, 200, 1000, 0.9
 CAMERA = Noise(1e-5, 1e-4)
-BLOCK = 512
-"""Trials at a time in the stages: enough to pay for the start of each kernel, few enough to stay in the cache."""
+REPEATS, FIT_REPEATS, STEPS = 7, 3, 1000
 
-TRIAL_BLOCK = 125
-"""Whole trials at a time; the search for start values takes fewer of them at once by itself."""
 
-FITS, FIT_SAMPLES, FIT_BLOCK, FIT_REPEATS = 64, 1000, 16, 3
-REPEATS, STEPS = 7, 1000
+class Sizes(NamedTuple):
+    """Trials of the stages and of a block of them, whole trials of a block, fits and those of a block."""
+
+    trials: int
+    block: int
+    trial_block: int
+    fits: int
+    fit_block: int
+
+
+ON_CPU = Sizes(1024, 512, 125, 64, 16)
+"""Blocks of a CPU: enough trials to pay for the start of each kernel, few enough to stay in the cache. The search for
+start values takes fewer of them at once by itself."""
+
+ROW_BYTES, TRIAL_BYTES, FIT_BYTES = 1e3, 5e6, 1e7
+"""What a graphics card needs for a row of the stages, for a whole trial and for a fit."""
+
+LARGEST = 1 << 16
+"""Trials of a block on a graphics card at most: more of them are no faster each."""
+
+C_NS = {"simulate_ns": 1.4, "path_length_ns": 1.4, "rls_ns": 4.4}
+"""Nanoseconds per trial-sample of the same three stages in C written by hand, one trial per SIMD lane, on the two cores
+of a server, recorded for comparison."""
+
+
+STAGES = ("simulate_ns", "path_length_ns", "rls_ns", "noise_ns")
+
+
+def device_sizes() -> Sizes:
+    """Those of this process's devices: what fits a CPU's cache, or a card's memory."""
+    if card_memory() is None:
+        return ON_CPU
+    block, trials, fits = (
+        min(LARGEST, trials_at_once(size, each))
+        for size, each in zip(
+            (ON_CPU.block, ON_CPU.trial_block, ON_CPU.fit_block),
+            (ROW_BYTES * SAMPLES, TRIAL_BYTES, FIT_BYTES),
+            strict=True,
+        )
+    )
+    return Sizes(block, block, trials, fits, fits)
 
 
 class Bench(NamedTuple):
-    """Nanoseconds per trial-sample of each stage (1024 trials of 2000 samples, double precision), whole trials per
-    second (1000 samples each, noise drawn, start values searched), milliseconds per search for start values, each the
-    median of REPEATS; microseconds that one robot waits for `recursive.step` on one row of plain numbers, the call
-    included; milliseconds per maximum-likelihood fit in a batch of 64 runs of 1000 samples of a robot without coupling,
-    the median of FIT_REPEATS; seconds that the whole trial took to compile; devices and versions."""
+    """Nanoseconds per trial-sample of each stage (2000 samples, double precision), whole trials per second (1000
+    samples each, noise drawn, start values searched), milliseconds per search for start values, each the median of
+    REPEATS; microseconds that one robot waits for `recursive.step` on one row of plain numbers, the call included;
+    milliseconds per maximum-likelihood fit in a batch of runs of 1000 samples of a robot without coupling, the median
+    of FIT_REPEATS; seconds that the whole trial took to compile; devices and versions; trials: the sizes of all these
+    batches, larger on a graphics card than on a CPU."""
 
     simulate_ns: float
     path_length_ns: float
@@ -55,14 +91,15 @@ class Bench(NamedTuple):
     step_us: float
     maximum_likelihood_ms: float
     compile_s: float
+    trials: dict[str, int]
     devices: list[str]
     versions: dict[str, str]
 
 
-def stages(robot: Model, key: Array) -> dict[str, float]:
+def stages(robot: Model, key: Array, sizes: Sizes) -> dict[str, float]:
     """Nanoseconds per trial-sample of the simulation, the path length, both recursions and the noise draws."""
     period = jnp.asarray(robot.sample_period)
-    keys = [(block,) for block in jax.random.split(key, (TRIALS // BLOCK, BLOCK))]
+    keys = [(block,) for block in jax.random.split(key, (sizes.trials // sizes.block, sizes.block))]
     commands = in_parallel(jax.jit(jax.vmap(lambda k: multilevel(k, SAMPLES), out_axes=-1)), keys)
 
     @jax.jit
@@ -77,7 +114,7 @@ def stages(robot: Model, key: Array) -> dict[str, float]:
     _, rls_s = _time(jax.jit(recursive.run_to_end), list(zip(starts, observations, strict=True)))
     _, noise_s = _time(jax.jit(jax.vmap(lambda k: draw_noise(k, SAMPLES))), keys)
     seconds = {"simulate_ns": simulate_s, "path_length_ns": path_s, "rls_ns": rls_s, "noise_ns": noise_s}
-    return {name: 1e9 * second / (TRIALS * SAMPLES) for name, second in seconds.items()}
+    return {name: 1e9 * second / (sizes.trials * SAMPLES) for name, second in seconds.items()}
 
 
 def _at(robot: Model, setup: Observations) -> recursive.Estimate:
@@ -110,9 +147,9 @@ def start_values(command: Wheels, pose: Pose, period: Array) -> Setup:
     return initialise(observe_log(log), d_max=D_MAX)
 
 
-def whole_trials(robot: Model, key: Array, count: int) -> tuple[float, float]:
+def whole_trials(robot: Model, key: Array, count: int, block: int) -> tuple[float, float]:
     """Whole trials per second, and the seconds to compile them."""
-    keys = [(block,) for block in jax.random.split(key, (count // TRIAL_BLOCK, TRIAL_BLOCK))]
+    keys = [(block,) for block in jax.random.split(key, (count // block, block))]
     program = jax.jit(jax.vmap(lambda k: trial(robot, k)))
     begin = time.perf_counter()
     compiled = program.lower(*keys[0]).compile()
@@ -134,10 +171,10 @@ def noisy_runs(robot: Model, key: Array, samples: int, count: int, block: int) -
     return in_parallel(jax.jit(jax.vmap(one)), [(row,) for row in keys])
 
 
-def start_value_ms(robot: Model, key: Array, count: int) -> float:
+def start_value_ms(robot: Model, key: Array, count: int, block: int) -> float:
     """Milliseconds that the search for start values takes per trial in a batch of `count`."""
     period = jnp.asarray(robot.sample_period)
-    blocks = noisy_runs(robot, key, SETUP_ROWS, count, TRIAL_BLOCK)
+    blocks = noisy_runs(robot, key, SETUP_ROWS, count, block)
     search = jax.jit(jax.vmap(lambda command, pose: start_values(command, pose, period)))
     return 1e3 * _time(search, blocks)[1] / count
 
@@ -160,8 +197,8 @@ def step_us(robot: Model, key: Array) -> float:
     return 1e6 * _time(take_rows, [()])[1] / STEPS
 
 
-def maximum_likelihood_ms(robot: Model, key: Array) -> float:
-    """Milliseconds that a maximum-likelihood fit takes per run in a batch of FITS runs of FIT_SAMPLES samples.
+def maximum_likelihood_ms(robot: Model, key: Array, count: int, block: int) -> float:
+    """Milliseconds that a maximum-likelihood fit takes per run in a batch of `count` runs of FIT_SAMPLES samples.
 
     The runs are those of the robot without its coupling, which the fit leaves out as well: a model that does not fit
     takes two to five times as many steps.
@@ -173,26 +210,38 @@ def maximum_likelihood_ms(robot: Model, key: Array) -> float:
         command, pose = jax.tree.map(lambda column: column[None], (command, pose))
         return fit_runs(Runs(period, command, pose, jnp.ones((1, FIT_SAMPLES), bool)), jnp.asarray(D_MAX))
 
-    blocks = noisy_runs(robot, key, FIT_SAMPLES, FITS, FIT_BLOCK)
-    return 1e3 * _time(jax.jit(jax.vmap(fit)), blocks, FIT_REPEATS)[1] / FITS
+    blocks = noisy_runs(robot, key, FIT_SAMPLES, count, block)
+    return 1e3 * _time(jax.jit(jax.vmap(fit)), blocks, FIT_REPEATS)[1] / count
 
 
-def bench(robot: Model, *, trials: int = 1000, seed: int = 0) -> Bench:
-    """All figures; `trials` whole trials, rounded up to whole blocks. Needs double precision."""
+def bench(robot: Model, *, trials: int = 1000, seed: int = 0, sizes: Sizes | None = None) -> Bench:
+    """All figures; `trials` whole trials, rounded up to whole blocks; `sizes`: those of the device unless said. Needs
+    double precision."""
     require_float64("bench")
-    trials = -(-trials // TRIAL_BLOCK) * TRIAL_BLOCK
+    sizes = sizes or device_sizes()
+    trials = -(-trials // sizes.trial_block) * sizes.trial_block
     keys = jax.random.split(jax.random.key(seed), 4)
-    per_second, compile_s = whole_trials(robot, keys[1], trials)
+    per_second, compile_s = whole_trials(robot, keys[1], trials, sizes.trial_block)
     return Bench(
-        **stages(robot, keys[0]),
+        **stages(robot, keys[0], sizes),
         trials_per_s=per_second,
-        initialise_ms=start_value_ms(robot, keys[2], trials),
+        initialise_ms=start_value_ms(robot, keys[2], trials, sizes.trial_block),
         step_us=step_us(robot, keys[2]),
-        maximum_likelihood_ms=maximum_likelihood_ms(robot, keys[3]),
+        maximum_likelihood_ms=maximum_likelihood_ms(robot, keys[3], sizes.fits, sizes.fit_block),
         compile_s=compile_s,
+        trials={"stages": sizes.trials, "whole": trials, "fits": sizes.fits},
         devices=[str(device) for device in jax.devices()],
         versions=versions(),
     )
+
+
+def parts(figures: Bench) -> dict[str, float]:
+    """What every stage takes of a whole trial, as fractions; `rest` is what none of them is: commands, camera, copies,
+    and that a stage alone runs in blocks that suit it."""
+    whole = 1.0 / figures.trials_per_s
+    found = {name: 1e-9 * getattr(figures, name) * TRIAL_SAMPLES / whole for name in STAGES}
+    found["initialise_ms"] = 1e-3 * figures.initialise_ms / whole
+    return found | {"rest": 1.0 - sum(found.values())}
 
 
 def _time(

@@ -12,17 +12,18 @@ import numpy as np
 from jaxident.array_types import Wheels
 from jaxident.effects.catalogue import to_vector
 from jaxident.numerics import require_float64
-from jaxident.parallel import in_parallel
+from jaxident.parallel import in_parallel, trials_at_once
 from jaxident.robot.excitation import EXCITATIONS
 from jaxident.robot.model import require_physical
 from jaxident.study.design import PARTS, Study
 from jaxident.study.estimators import runs_alone
 from jaxident.study.trial import Cell, Outcome, Plan, Recording, Robot, commands, record, run_trial
 
-BLOCK = {"cpu": 50}
-"""Trials at once on one device: on a CPU so few that their work stays in the cache."""
+BLOCK = 50
+"""Trials at once on a CPU: so few that their work stays in the cache."""
 
-BLOCK_ELSEWHERE = 2048
+TRIAL_BYTES, ROW_BYTES = 1e6, 4e3
+"""What one trial of one estimator needs on a graphics card, and each of its rows."""
 
 STATIC = ("excitation", "samples")
 """Axes that the compiled program is fixed to: no chunk spans two of their entries."""
@@ -101,7 +102,8 @@ def run_locally(study: Study, numbers: Sequence[int]) -> Iterator[tuple[int, Out
 
 def block_size(study: Study) -> int:
     """Trials of a block: fixed for a study, so that the program is compiled once for each run length."""
-    size = BLOCK.get(jax.default_backend(), BLOCK_ELSEWHERE)
+    each = len(study.estimators) * (TRIAL_BYTES + ROW_BYTES * max(study.samples))
+    size = trials_at_once(BLOCK, each)
     return min(size, math.prod(chunk_shape(study))) * jax.local_device_count()
 
 

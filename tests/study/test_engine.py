@@ -61,7 +61,7 @@ def test_a_trial_alone_is_the_trial_in_the_study(whole, number):
 
 def test_chunks_of_any_size_give_the_same_trials(whole, monkeypatch):
     """Bit for bit where the block, the shape of the compiled program, is the same."""
-    monkeypatch.setitem(engine.BLOCK, "cpu", 4)
+    monkeypatch.setattr(engine, "BLOCK", 4)
     other = study_arrays(SMALL._replace(chunk=100))
     for name in other:
         np.testing.assert_array_equal(other[name], whole[name])
