@@ -46,15 +46,14 @@ ON_CPU = Sizes(1024, 512, 125, 64, 16)
 start values takes fewer of them at once by itself."""
 
 ROW_BYTES, TRIAL_BYTES, FIT_BYTES = 1e3, 5e6, 1e7
-"""What a graphics card needs for a row of the stages, for a whole trial and for a fit."""
+"""What a graphics card is given for a row of the stages, a whole trial and a fit; a trial took 0.3 MB on an H200."""
 
 LARGEST = 1 << 16
 """Trials of a block on a graphics card at most: more of them are no faster each."""
 
-C_NS = {"simulate_ns": 1.4, "path_length_ns": 1.4, "rls_ns": 4.4}
-"""Nanoseconds per trial-sample of the same three stages in C written by hand, one trial per SIMD lane, on the two cores
-of a server, recorded for comparison."""
-
+C_NS = {"simulate_ns": 2.5, "path_length_ns": 2.1, "rls_ns": 6.2}
+"""Nanoseconds per trial-sample of the same stages in C written by hand, one trial per SIMD lane, on two cores of an AMD
+EPYC with AVX-512 (`experiments/speed.md`), recorded for comparison."""
 
 STAGES = ("simulate_ns", "path_length_ns", "rls_ns", "noise_ns")
 
@@ -63,14 +62,9 @@ def device_sizes() -> Sizes:
     """Those of this process's devices: what fits a CPU's cache, or a card's memory."""
     if card_memory() is None:
         return ON_CPU
-    block, trials, fits = (
-        min(LARGEST, trials_at_once(size, each))
-        for size, each in zip(
-            (ON_CPU.block, ON_CPU.trial_block, ON_CPU.fit_block),
-            (ROW_BYTES * SAMPLES, TRIAL_BYTES, FIT_BYTES),
-            strict=True,
-        )
-    )
+    block = min(LARGEST, trials_at_once(ON_CPU.block, ROW_BYTES * SAMPLES))
+    trials = min(LARGEST, trials_at_once(ON_CPU.trial_block, TRIAL_BYTES))
+    fits = min(LARGEST, trials_at_once(ON_CPU.fit_block, FIT_BYTES))
     return Sizes(block, block, trials, fits, fits)
 
 
@@ -102,10 +96,7 @@ def stages(robot: Model, key: Array, sizes: Sizes) -> dict[str, float]:
     keys = [(block,) for block in jax.random.split(key, (sizes.trials // sizes.block, sizes.block))]
     commands = in_parallel(jax.jit(jax.vmap(lambda k: multilevel(k, SAMPLES), out_axes=-1)), keys)
 
-    @jax.jit
-    def run(command: Wheels) -> Pose:
-        return run_physical(robot, command, period, AT_REST).pose
-
+    run = jax.jit(lambda command: run_physical(robot, command, period, AT_REST).pose)
     poses, simulate_s = _time(run, [(command,) for command in commands])
     increments, path_s = _time(path_length, [(pose,) for pose in poses])
     observations = [complete_observations(*pair) for pair in zip(commands, increments, strict=True)]

@@ -23,7 +23,8 @@ BLOCK = 50
 """Trials at once on a CPU: so few that their work stays in the cache."""
 
 TRIAL_BYTES, ROW_BYTES = 1e6, 4e3
-"""What one trial of one estimator needs on a graphics card, and each of its rows."""
+"""What a graphics card is given for a trial of one estimator, and for each of its rows: on an H200 a whole trial of the
+recursion took 0.3 MB with 1000 rows; what others take was not measured."""
 
 STATIC = ("excitation", "samples")
 """Axes that the compiled program is fixed to: no chunk spans two of their entries."""
