@@ -32,6 +32,7 @@ COPIED = {
             "discovered.md",
             "export_gap.md",
             "speed.md",
+            "gpu.md",
         )
     },
 }

@@ -1,16 +1,16 @@
 """Plugins for a robot in Gazebo: `--to gazebo`, elements of a <model> of SDF.
 
 Elements as in gz-sim: DiffDrive (left_joint, right_joint, wheel_separation, wheel_radius, limits of speed and
-acceleration), OdometryPublisher (xyz_offset, rpy_offset, gaussian_noise, odom_publish_frequency), WheelSlip
-(slip_compliance_lateral and what it needs). DiffDrive turns wheels at the speeds that it is told at once: the drive's
-own motion stands in the wrapper, whose v and w go to cmd_vel.
+acceleration), OdometryPublisher (xyz_offset, rpy_offset, odom_publish_frequency), WheelSlip (slip_compliance_lateral
+and what it needs). DiffDrive turns wheels at the speeds that it is told at once: the drive's own motion stands in the
+wrapper, whose v and w go to cmd_vel. The publisher's gaussian_noise is added to speeds, never to poses (gz-sim,
+OdometryPublisher.cc, July 2026), so no element carries the camera's noise.
 """
 
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.export.ask import Ask, Reach
 from jaxident.export.mjcf import GRAVITY
 from jaxident.export.split import (
-    CAMERA,
     COUPLING,
     DEAD_ZONE,
     DRIVE,
@@ -27,8 +27,8 @@ from jaxident.robot.model import Model
 
 TARGET = Target(
     "gazebo", "Gazebo",
-    {CAMERA: "gaussian_noise (of position; heading has none of its own)", "marker place": "xyz_offset",
-     "marker turn": "rpy_offset", "side slip": "slip_compliance_lateral (right at half the largest speed)"},
+    {"marker place": "xyz_offset", "marker turn": "rpy_offset",
+     "side slip": "slip_compliance_lateral (right at half the largest speed)"},
     stages=DRIVE - {"side"}, wraps=frozenset({GAIN, RATE, COUPLING, DEAD_ZONE}), needs_wheels=True,
     uses=("wheel_radius", "track", "mass", "limit"),
 )  # fmt: skip
@@ -70,11 +70,10 @@ def _drive(model: Model, robot: Robot, ask: Ask, reach: Reach | None) -> str:
 
 def _odometry(model: Model, values: dict) -> str:
     place, turn = values.get("marker place", {}), values.get("marker turn", {})
-    noise = 0.0 if model.noise is None else model.noise.position
     return _plugin("OdometryPublisher", "odometry-publisher", [
         ("odom_publish_frequency", number(1.0 / float(model.sample_period))), ("dimensions", "2"),
         ("xyz_offset", f"{number(place.get('ahead', 0.0))} {number(place.get('left', 0.0))} 0"),
-        ("rpy_offset", f"0 0 {number(turn.get('offset', 0.0))}"), ("gaussian_noise", number(noise)),
+        ("rpy_offset", f"0 0 {number(turn.get('offset', 0.0))}"),
     ])  # fmt: skip
 
 

@@ -1,7 +1,8 @@
 """Actuator configurations for Isaac Lab: `--to isaac`, a Python file with one plain dictionary.
 
 Names are those of `isaaclab.actuators` (ActuatorBaseCfg: stiffness, damping, armature, friction, dynamic_friction,
-effort_limit, velocity_limit; DelayedPDActuatorCfg: min_delay, max_delay in steps of the simulation). A wheel is driven
+effort_limit; DelayedPDActuatorCfg: min_delay, max_delay in steps of the simulation). Isaac Lab 3 calls effort_limit
+actuator_effort_limit and takes the old name until version 4. A wheel is driven
 to a speed: torque = damping (target - speed), which is the model's motor. Friction is a torque [N m], as in Isaac Sim 5
 and later. The file loads without Isaac.
 """

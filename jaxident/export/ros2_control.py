@@ -1,9 +1,10 @@
 """Parameters of ros2_control's diff_drive_controller: `--to ros2_control`, a YAML file.
 
 Names as in ros2_controllers (wheel_separation, wheel_radius, wheel_separation_multiplier, left_ and
-right_wheel_radius_multiplier, linear.x and angular.z limits, twist_covariance_diagonal). The controller turns wanted
-speeds into wheel speeds; the wrapper stands between it and the motors and makes up for what it does not know, by
-feed-forward and the inverse of the dead zones.
+right_wheel_radius_multiplier, linear.x and angular.z limits, twist_covariance_diagonal). Limits have the names of
+ROS 2 Jazzy and later, and beside them those that Humble and Iron read. The controller turns wanted speeds into wheel
+speeds; the wrapper stands between it and the motors and makes up for what it does not know, by feed-forward and the
+inverse of the dead zones.
 """
 
 import numpy as np
@@ -34,7 +35,6 @@ def write(model: Model, robot: Robot, ask: Ask, reach: Reach | None) -> str:
         ("wheel_separation", number(ask.track or robot.track)), ("wheel_radius", number(robot.radius)),
         ("wheel_separation_multiplier", number(robot.track / (ask.track or robot.track))),
         *_multipliers(robot, ask),
-        ("publish_rate", number(1.0 / float(model.sample_period))),
         *_covariance(model),
     ]  # fmt: skip
     lines += [f"    {name}: {value}" for name, value in rows]
@@ -64,7 +64,10 @@ def _covariance(model: Model) -> list[tuple[str, str]]:
 
 
 def _limits(axis: str, speed: float, acceleration: float) -> list[str]:
-    rows = [("has_velocity_limits", "true"), ("max_velocity", number(speed)), ("min_velocity", number(-speed)),
-            ("has_acceleration_limits", "true"), ("max_acceleration", number(acceleration)),
-            ("min_acceleration", number(-acceleration))]  # fmt: skip
-    return [f"      {axis}:", *(f"        {name}: {value}" for name, value in rows)]
+    """Largest speed and acceleration of an axis both ways. A controller leaves out names that its version has not."""
+    rows = [("max_velocity", number(speed)), ("min_velocity", number(-speed)),
+            ("max_acceleration", number(acceleration)), ("max_deceleration", number(-acceleration))]  # fmt: skip
+    older = [("has_velocity_limits", "true"), ("has_acceleration_limits", "true"),
+             ("min_acceleration", number(-acceleration))]  # fmt: skip
+    told = [f"        {name}: {value}" for name, value in rows]
+    return [f"      {axis}:", *told, *(f"        {name}: {value}  # Humble and Iron" for name, value in older)]

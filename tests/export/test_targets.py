@@ -111,7 +111,7 @@ def test_gazebo_has_the_elements_of_its_plugins():
     odometry = {entry.tag: entry.text for entry in plugins["OdometryPublisher"]}
     assert odometry["xyz_offset"] == "0.02 -0.01 0"
     assert odometry["rpy_offset"] == "0 0 0.05"
-    assert float(odometry["gaussian_noise"]) == 5e-4
+    assert ways(made)["camera noise"] == "not carried"
     wheel = {entry.tag: float(entry.text) for entry in plugins["WheelSlip"].find("wheel")}
     assert wheel["slip_compliance_lateral"] == pytest.approx(0.03 * 9.81 / (0.5 * speed))
     assert ways(made)["motor_lag"] == "wrapper"

@@ -55,6 +55,7 @@ class Prior(NamedTuple):
     weight: Any
 
 
+@jax.jit
 def prior_of(runs: Runs) -> Prior:
     """The prior for runs (runs, rows); pure, maps over trials."""
     largest = jnp.maximum(jnp.max(jnp.abs(jnp.stack(runs.command))), 1e-12)
