@@ -54,9 +54,9 @@ def open_bag(path: str | os.PathLike) -> Iterator[Any]:
         raise
     except Exception as error:  # a damaged bag fails in the reader, in YAML, in SQLite, in a decompressor ...
         told = " ".join(str(error).split()) or type(error).__name__
-        raise InputError(
-            f"{path}: {UNREADABLE} ({told[:200]}); record or copy it again, or try `ros2 bag reindex`"
-        ) from error
+        again = "record or copy it again, or try `ros2 bag reindex`"
+        mend = "decrypt it with the program that wrote it" if "encrypt" in told else again
+        raise InputError(f"{path}: {UNREADABLE} ({told[:200]}); {mend}") from error
 
 
 def topics_of(reader: Any) -> list[Topic]:

@@ -243,6 +243,23 @@ def test_no_bag_empty_and_cut_bags_are_refused(tmp_path, form):
         assert "\n" not in str(caught.value)
 
 
+def test_an_encrypted_bag_is_named(tmp_path):
+    """A ROS 1 bag says in its first record what encrypts it; the record is filled up with blanks to 4096 bytes."""
+    path = write_bag(name_of(tmp_path, ROS_1), ROS_1)
+    content = path.read_bytes()
+    begin = len(b"#ROSBAG V2.0\n")
+    length = int.from_bytes(content[begin : begin + 4], "little")
+    header, rest = content[begin + 4 : begin + 4 + length], content[begin + 4 + length :]
+    filled = int.from_bytes(rest[:4], "little")
+    entry = b"encryptor=rosbag/AesCbcEncryptor"
+    header += len(entry).to_bytes(4, "little") + entry
+    less = len(entry) + 4
+    sizes = len(header).to_bytes(4, "little"), (filled - less).to_bytes(4, "little")
+    path.write_bytes(content[:begin] + sizes[0] + header + sizes[1] + rest[4 + less :])
+    with pytest.raises(InputError, match="is no bag that can be read .*encryption.*; decrypt it"):
+        list_topics(path)
+
+
 def test_a_file_that_is_no_bag(tmp_path):
     (tmp_path / "x.csv").write_text("t,x\n")
     for path in (tmp_path, tmp_path / "x.csv"):
