@@ -256,7 +256,7 @@ def test_an_encrypted_bag_is_named(tmp_path):
     less = len(entry) + 4
     sizes = len(header).to_bytes(4, "little"), (filled - less).to_bytes(4, "little")
     path.write_bytes(content[:begin] + sizes[0] + header + sizes[1] + rest[4 + less :])
-    with pytest.raises(InputError, match="is no bag that can be read .*encryption.*; decrypt it"):
+    with pytest.raises(InputError, match=r"is no bag that can be read .*encryption.*; decrypt it"):
         list_topics(path)
 
 
