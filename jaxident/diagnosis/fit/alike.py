@@ -16,7 +16,8 @@ from jaxident.effects.coordinates import NOMINAL
 
 SPREAD = 0.1
 """Deviation [rad] of the angle: gains that differ by a fifth. No other value was tried."""
-_GAINS = [(NOMINAL.index(f"gain_{channel}1"), NOMINAL.index(f"gain_{channel}2")) for channel in (1, 2)]
+GAINS = [(NOMINAL.index(f"gain_{channel}1"), NOMINAL.index(f"gain_{channel}2")) for channel in (1, 2)]
+"""Places of both gains of each channel."""
 _SIGNS = (1.0, -1.0)
 
 
@@ -24,7 +25,7 @@ def departures(vector: Array) -> tuple[np.ndarray, np.ndarray]:
     """How far the gains of a vector (SIZE,) depart from equal wheels, in deviations (2,), and the derivatives by the
     nominal coordinates (2, 10)."""
     away, slopes = np.zeros(2), np.zeros((2, len(NOMINAL)))
-    for channel, ((right, left), sign) in enumerate(zip(_GAINS, _SIGNS, strict=True)):
+    for channel, ((right, left), sign) in enumerate(zip(GAINS, _SIGNS, strict=True)):
         one, other = vector[right], sign * vector[left]
         angle = np.arctan2(other, one) - 0.25 * np.pi
         away[channel] = (angle - np.pi * np.round(angle / np.pi)) / SPREAD

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.fit.alike import unlikeliness, with_prior
+from jaxident.diagnosis.fit.alike import GAINS, unlikeliness, with_prior
 from jaxident.diagnosis.motion.linear import Linear, follow, gram, linearise, normal
 from jaxident.diagnosis.motion.rims import Rims, rim_speeds
 from jaxident.diagnosis.motion.windows import Windows
@@ -19,6 +19,10 @@ ENOUGH = 0.05
 """Promised fall of -log p below which the search ends."""
 LONGEST = 0.5
 """A step changes a rate by at most this much, as a logarithm."""
+LONGEST_GAIN = 1.0
+"""A step changes a gain by at most this many times both gains of its channel. The prior of the gains is an angle. Where
+the runs tell nothing of a wheel, a free step would overshoot by up to pi/2 times the gains, and the next by more: the
+gain of a wheel that hardly ever passed its dead zone went to -4e25. One time the gains brings both wheels back."""
 INSTANTS = [PLACES[pair] for pair, coordinate in REACHED.items() if not coordinate.relative]
 COUPLING = [NOMINAL.index("coupling_1"), NOMINAL.index("coupling_2")]
 PARTS = (1.0, 0.25, 0.0)
@@ -166,6 +170,9 @@ def _step(products: Array, now: Array, low: Array, high: Array, damping: float) 
     longest = np.max(np.abs(step[:2])) if len(step) > 1 else 0.0
     if longest > LONGEST:
         step = step * LONGEST / longest
+    for pair in map(list, GAINS):
+        largest = LONGEST_GAIN * np.hypot(*now[pair])
+        step[pair] = np.clip(step[pair], -largest, largest)
     step = np.clip(now + step, low, high) - now
     return step, float(step @ products[:-1, -1] - 0.5 * step @ products[:-1, :-1] @ step)
 

@@ -1,0 +1,48 @@
+"""A refit stays at a robot that can be, also where the runs say nothing of one wheel."""
+
+import jax
+import numpy as np
+import pytest
+
+from jaxident.diagnosis.fit.nominal import first_starts
+from jaxident.diagnosis.fit.refit import Data, refit
+from jaxident.diagnosis.motion.windows import cut
+from jaxident.diagnosis.noise.law import Law, white_whitener
+from jaxident.effects.coordinates import neutral_vector, nominal_vector
+from jaxident.log import Log, join
+from jaxident.robot.drive import Physical
+from jaxident.robot.model import Model
+from jaxident.robot.noise import Noise
+from jaxident.robot.simulate import simulate
+from jaxident.study.synthetic import excite
+
+STEP = 0.03
+DRIVE = Physical(np.array([3.0, 5.0]), np.array([[0.5, 0.45], [9.0, -8.5]]))
+
+
+def runs_that_contradict():
+    """Windows of three runs whose left wheel gets a command of one size or none. It passes the dead zone in the second
+    run alone, where the dead zone is smaller."""
+    runs = []
+    for k, (command, zone) in enumerate([(0.3, 0.305), (0.31, 0.1), (0.3, 0.305)]):
+        robot = Model(STEP, DRIVE, np.array([0.1, zone]), noise=Noise(3e-4, 2e-3))
+        plain = excite(jax.random.key(k), "multilevel", 400, STEP, hold=20)
+        left = np.where(np.abs(plain.u_l) > 0.4, command, 0.0) * np.sign(plain.u_l)
+        runs.append(simulate(robot, plain._replace(u_l=left), key=jax.random.key(10 + k)))
+    return cut(join([Log(*map(np.asarray, run)) for run in runs]), 50)
+
+
+def test_the_gain_of_a_wheel_that_never_passes_its_dead_zone_follows_the_other_wheel():
+    """One dead zone fits no such robot. The first fit puts it above every command, so that only the prior knows the
+    left wheel; each further fit begins where the last one ended, as in a search."""
+    windows = runs_that_contradict()
+    data = Data(windows, white_whitener(Law(3e-4, 2e-3), windows))
+    vector, starts = neutral_vector(nominal_vector(DRIVE, np.array([0.1, 0.2]))), first_starts(windows)
+    for effects in ((), ("dead_zone_drift",), (), ("dead_zone_drift",)):
+        fit = refit(data, vector, starts, effects)
+        vector, starts = fit.vector, fit.starts
+        assert np.isfinite(fit.cost)
+        assert np.all(np.isfinite(fit.covariance))
+    right, left = vector[[2, 4]], vector[[3, 5]]
+    assert vector[7] > 0.3, "no command passes the left dead zone: otherwise this test shows nothing"
+    assert left == pytest.approx(right * np.array([1.0, -1.0]), rel=1e-3)
