@@ -47,6 +47,11 @@ def _in(folder: str, *names: str) -> tuple[str, ...]:
     return tuple(f"{folder}/{name}" for name in names)
 
 
+def _told(name: str) -> tuple[str, str]:
+    """An output, and the file beside it that says what it was made from."""
+    return name, f"{name}.provenance.json"
+
+
 RUNS = tuple(f"real_{k}.csv" for k in range(1, 7))
 AHEAD = ("predict", "seen.json", "log.csv", "--horizon", "5")
 FIGURES = (
@@ -55,13 +60,16 @@ FIGURES = (
 )
 CASES = (
     Case(("effects", "--json", "e.json"), ("e.json",)),
-    Case((*SIMULATE, "--out", "s.csv.gz"), ("s.csv.gz",)),
+    Case((*SIMULATE, "--out", "s.csv.gz"), _told("s.csv.gz")),
     Case(("example", "--effect", "none", "--out", "ex"), _in("ex", *RUNS, ".answer.json")),
-    Case(("convert", "--commands", "commands.csv", "--poses", "poses.csv", "--out", "c.csv"), ("c.csv",)),
+    Case(("convert", "--commands", "commands.csv", "--poses", "poses.csv", "--out", "c.csv"), _told("c.csv")),
     Case(("identify", "log.csv", *SEEN, "--out", "i.json", "--json", "r.json"), ("i.json", "r.json")),
-    Case((*AHEAD, "--out", "p.csv", "--json", "p.json"), ("p.csv", "p.json")),
-    Case(("export", "ml.json", "--to", "mjcf", "--out", "m.xml", "--json", "m.json"), ("m.xml", "m.json")),
-    Case(("plan", "ml.json", "--between", "transport_delay,motor_lag", "--out", "n.csv"), ("n.csv",)),
+    Case((*AHEAD, "--out", "p.csv", "--json", "p.json"), (*_told("p.csv"), "p.json")),
+    Case(
+        ("export", "ml.json", "--to", "mjcf", "--out", "m.xml", "--json", "m.json"),
+        (*_told("m.xml"), "m_commands.py", "m.json"),
+    ),
+    Case(("plan", "ml.json", "--between", "transport_delay,motor_lag", "--out", "n.csv"), _told("n.csv")),
     Case(
         ("diagnose", "real", "--out", "d"),
         _in("d", "diagnosis.json", "nominal_model.json", "corrected_model.json", "report.html"),

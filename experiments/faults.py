@@ -14,7 +14,7 @@ import tempfile
 import time
 from typing import NamedTuple
 
-from experiments.fault_cases import CASES, Case, contents, copied, prepare, run
+from experiments.fault_cases import CASES, Case, contents, copied, prepare, run, wrong
 from experiments.fault_cluster import cluster_faults
 from experiments.fault_damage import damages
 from experiments.fault_kills import kills
@@ -41,6 +41,8 @@ def reference(case: Case, base: pathlib.Path, place: pathlib.Path) -> tuple[dict
         code, _, err = run(case.words, folder)
         if code or set(found := contents(folder, case)) != set(case.outputs):
             raise SystemExit(f"{case.name}: {code} {err} {sorted(found)}")
+        if faults := wrong(folder, base, case, found, ""):
+            raise SystemExit(f"{case.name}: {faults}")
     return found, time.perf_counter() - begin
 
 
