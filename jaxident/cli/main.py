@@ -64,7 +64,7 @@ def run() -> None:
     """Entry point of `jaxident` and `python -m jaxident`: exit 0 done, 2 wrong use or bad input, 1 the work failed."""
     # two threads make NumPy's small matrices five times slower on a busy machine; read once, when NumPy is loaded
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    warnings.showwarning = lambda message, *_, **__: print(f"warning: {one_line(str(message))}", file=sys.stderr)
+    warnings.showwarning = _show_warning
     for stream in (sys.stdout, sys.stderr):  # a file's name may be no text: what cannot be printed is written out
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
@@ -75,6 +75,12 @@ def run() -> None:
     except BaseException as error:
         code = _explain(error)
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _show_warning(message: Warning | str, category: type[Warning], *_, **__) -> None:
+    """Print a warning on one line; what a library tells its developers about its future is nothing for users."""
+    if not issubclass(category, DeprecationWarning | PendingDeprecationWarning | FutureWarning):
+        print(f"warning: {one_line(str(message))}", file=sys.stderr)
 
 
 def _explain(error: BaseException) -> int:

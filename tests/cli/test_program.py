@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from support.program import jaxident, refused
 
+from jaxident.cli.main import _show_warning
 from jaxident.files.logs import read_log
 from jaxident.files.models import load_model
 
@@ -213,3 +214,10 @@ def test_example_keeps_its_effect_in_the_answer(tmp_path):
     assert len(list((tmp_path / "a").glob("real_*.csv"))) == 6
     refused(jaxident("example", "--effect", "gearbox", "--out", tmp_path / "b"), "unknown effect 'gearbox'")
     assert not (tmp_path / "b").exists()
+
+
+def test_a_library_s_word_to_its_developers_is_no_warning(capsys):
+    _show_warning(DeprecationWarning("use another function"), DeprecationWarning, "zarr.py", 1)
+    assert capsys.readouterr().err == ""
+    _show_warning(UserWarning("half of\nthe rows"), UserWarning, "log.py", 1)
+    assert capsys.readouterr().err == "warning: half of the rows\n"

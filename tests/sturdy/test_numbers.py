@@ -96,20 +96,29 @@ def test_identify_under_some_stress():
     assert wrong == 0
 
 
+def recursed(stress: Stress, log) -> None:
+    """From a sound start through a stressed log: the state stays finite."""
+    step = jax.jit(recursive.step)
+    largest = float(np.nanmax(np.abs(np.stack(log.command))))
+    state = recursive.init(log[:80], d_max=0.9 * largest)
+    if not finite(state):
+        return  # a setup log that determines nothing: told by numbers that are none
+    for row in range(80, ROWS):
+        state, info = step(state, recursive.Sample(log.u_r[row], log.u_l[row], log.x[row], log.y[row], log.theta[row]))
+        assert finite(state, info.error, info.scale), (stress, row)
+
+
+def test_a_recursion_from_a_setup_that_tells_little():
+    """Noise of 12 m leaves the first covariance so ill-conditioned that a general inverse of it has negative variances:
+    the recursion ran away to infinity within 60 rows."""
+    *_, (_, stress, log) = cases(8)
+    recursed(stress, log)
+
+
 @pytest.mark.slow
 def test_a_recursion_under_stress():
-    """From a sound start through a stressed log: the state stays finite, its variances positive."""
-    step = jax.jit(recursive.step)
-    for _, stress, log in cases(8):
-        largest = float(np.nanmax(np.abs(np.stack(log.command))))
-        state = recursive.init(log[:80], d_max=0.9 * largest)
-        if not finite(state):
-            continue  # a setup log that determines nothing: told by numbers that are none
-        for row in range(80, ROWS):
-            state, info = step(
-                state, recursive.Sample(log.u_r[row], log.u_l[row], log.x[row], log.y[row], log.theta[row])
-            )
-            assert finite(state, info.error, info.scale), (stress, row)
+    for _, stress, log in cases(40):
+        recursed(stress, log)
 
 
 @pytest.mark.slow
@@ -120,7 +129,7 @@ def test_a_joint_filter_under_stress():
         largest = 0.9 * float(np.nanmax(np.abs(np.stack(log.command))))
         state = joint_filter.init(log[:80], d_max=largest)
         for row in range(80, ROWS):
-            state, info = step(state, joint_filter.Sample(*(float(column[row]) for column in log[:6])))
+            state, info = step(state, joint_filter.Sample(*(float(column[row]) for column in tuple(log)[:6])))
             if not bool(info.ok):
                 continue
             values, covariance = joint_filter.estimate(state)

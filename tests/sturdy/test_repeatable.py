@@ -20,18 +20,23 @@ MACHINES = {
     "one core": {"cores": 1},
     "four devices": {"XLA_FLAGS": "--xla_force_host_platform_device_count=4"},
 }
+ONE_CORE = """
+import os
+os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+from jaxident.cli.main import run
+run()
+"""
 DIGITS = 1e-10
 
 
 def made(folder, machine: dict) -> dict[str, bytes]:
     """What the commands write on a machine."""
     folder.mkdir()
-    own = dict(machine)
-    cores = own.pop("cores", None)
-    pin = None if cores is None else lambda: os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:cores])
+    program = ["-c", ONE_CORE] if machine == {"cores": 1} else ["-m", "jaxident"]
+    own = {} if machine == {"cores": 1} else machine
     for words in COMMANDS.values():
-        subprocess.run([sys.executable, "-m", "jaxident", *words], cwd=folder, env=os.environ | own, check=True,
-                       capture_output=True, preexec_fn=pin)  # fmt: skip
+        subprocess.run([sys.executable, *program, *words], cwd=folder, env=os.environ | own, check=True,
+                       capture_output=True)  # fmt: skip
     return {name: (folder / name).read_bytes() for name in COMMANDS}
 
 

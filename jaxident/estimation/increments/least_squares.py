@@ -10,6 +10,7 @@ growing where one of its variances would exceed WIDEST times that of the setup d
 from functools import reduce
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array
@@ -59,13 +60,19 @@ def equation_from(unknowns: Vector, information: Vector) -> Equation:
 
 
 def _inverse(information: Vector) -> tuple[Any, ...]:
-    """Covariance from information, both as lower triangles; what the setup did not inform gets a wide, finite one."""
+    """Covariance from information, both as lower triangles; what the setup did not inform gets a wide, finite one.
+
+    By Cholesky's factor: the product of a factor and its transpose has no negative variance. A general inverse of so
+    ill-conditioned a matrix can have some, and the recursion then runs away.
+    """
     rows, columns = (list(index) for index in zip(*LOWER, strict=True))
     matrix = jnp.zeros((UNKNOWNS, UNKNOWNS)).at[jnp.array(rows), jnp.array(columns)].set(jnp.stack(information))
     diagonal = jnp.diagonal(matrix)
     scale = jnp.sqrt(jnp.maximum(diagonal, 1e-12 * jnp.max(diagonal) + jnp.finfo(float).tiny))
     matrix = (matrix + matrix.T - jnp.diag(diagonal)) / (scale[:, None] * scale)
-    inverse = jnp.linalg.inv(matrix + 1e-10 * jnp.eye(UNKNOWNS)) / (scale[:, None] * scale)
+    factor = jnp.linalg.cholesky(matrix + 1e-10 * jnp.eye(UNKNOWNS))
+    root = jax.scipy.linalg.solve_triangular(factor, jnp.eye(UNKNOWNS), lower=True)
+    inverse = (root.T @ root) / (scale[:, None] * scale)
     return tuple(inverse[i, j] for i, j in LOWER)
 
 

@@ -69,7 +69,7 @@ class State(NamedTuple):
 class Info(NamedTuple):
     """What one row taught: prediction errors over their standard deviations (x, y, theta; 0 where not seen), whether
     the pose was used, whether the filter began to look for the robot anew, and whether the estimate can be trusted:
-    sound start, valid row, finite numbers, not lost."""
+    sound start, valid row, finite numbers, no negative variance, not lost."""
 
     error: Pose
     used: Any
@@ -139,7 +139,8 @@ def step(state: State, sample: Sample) -> tuple[State, Info]:
         t=jnp.where(later, sample.t, state.t),
         strikes=jnp.where(seen, jnp.where(used, 0, state.strikes + 1), state.strikes),
     )
-    ok = state.sound & good & ~lost & (after.strikes < LOST_AFTER)
+    positive = jnp.all(jnp.diagonal(after.belief.covariance) >= 0.0)  # rounding can break it where nothing is noisy
+    ok = state.sound & good & positive & ~lost & (after.strikes < LOST_AFTER)
     return after, Info(Pose(*error), used & good, lost, ok)
 
 
