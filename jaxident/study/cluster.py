@@ -8,6 +8,7 @@ import itertools
 import logging
 import re
 from collections.abc import Iterator, Sequence
+from concurrent.futures import CancelledError
 from typing import Any
 
 from jaxident.errors import InputError, WorkError
@@ -71,28 +72,38 @@ def _local_cluster(count: int) -> Iterator[str]:
 def run_on(client: Any, study: Study, numbers: Sequence[int]) -> Iterator[tuple[int, Outcome]]:
     """The chunks of these numbers, in the order in which they are done; a worker that dies is replaced by others.
 
-    WorkError where a chunk takes down every worker that tries it, or where workers have other versions.
+    Every task carries the study, about 1 kB: one that only workers held would be lost with the last of them.
+    WorkError where a chunk takes down every worker that tries it, where workers have other versions, or where the
+    scheduler is gone.
     """
-    from distributed import KilledWorker, as_completed
+    from distributed import as_completed
 
     waiting = iter(numbers)
-    whole = client.scatter(study, broadcast=True) if numbers else None
     ours = versions()
     workers = max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
 
     def submit(count: int) -> list[Any]:
         batch = itertools.islice(waiting, count)
-        return [client.submit(_task, whole, number, ours, pure=False, retries=RETRIES) for number in batch]
+        return [client.submit(_task, study, number, ours, pure=False, retries=RETRIES) for number in batch]
 
     running = as_completed(submit(AHEAD * workers), loop=client.loop)
+    for future in running:
+        number, outcome = _result(future)
+        running.update(submit(1))
+        future.release()
+        yield number, outcome
+
+
+def _result(future: Any) -> tuple[int, Outcome]:
+    """What a task gave back."""
+    from distributed import KilledWorker
+
     try:
-        for future in running:
-            number, outcome = future.result()
-            running.update(submit(1))
-            future.release()
-            yield number, outcome
+        return future.result()
     except KilledWorker as error:
         raise WorkError(f"a chunk ended {RETRIES} workers or more: {error}") from None
+    except (OSError, CancelledError) as error:
+        raise WorkError(f"the scheduler is gone ({type(error).__name__}); the same command goes on") from None
 
 
 def _task(study: Study, number: int, expected: dict[str, str]) -> tuple[int, Outcome]:
