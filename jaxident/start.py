@@ -6,7 +6,11 @@ import pathlib
 
 import jax
 
-SHARE_WORK = "xla_cpu_use_multi_output_fusion"
+FLAGS = {
+    "xla_backend_extra_options": "xla_cpu_use_multi_output_fusion",
+    "xla_gpu_autotune_level": "0",
+}
+"""What XLA is asked for, unless XLA_FLAGS says something else of it; `start_jax` says why."""
 
 TRIM_THRESHOLD, TOP_PAD, MMAP_THRESHOLD = -1, -2, -3
 KEPT_MEMORY = {MMAP_THRESHOLD: 32 << 20, TRIM_THRESHOLD: 256 << 20, TOP_PAD: 64 << 20}
@@ -19,8 +23,10 @@ def start_jax(*, cache: bool = True) -> None:
 
     * Double precision.
     * On a CPU, one kernel may give several results. Without this XLA computes what two results share once for each:
-      the recursion, whose 70 carried numbers share nearly everything, takes three times longer. It goes into
-      XLA_FLAGS, which XLA reads once, at the first computation; called later, this part has no effect.
+      the recursion, whose 70 carried numbers share nearly everything, takes three times longer.
+    * On a graphics card, kernels are not tried in several variants: compiling a whole trial takes 18 s and not 120 s,
+      and runs 7 % longer (`experiments/gpu.md`).
+    * Both go into XLA_FLAGS, which XLA reads once, at the first computation; called later, they have no effect.
     * Under glibc, up to 256 MB of freed memory stay with the process. Without this every array above some megabytes is
       fetched from the system page by page and given back: a third of the time of a simulation of many trials.
     * With `cache`, compiled code is kept between runs in the user's cache folder; JAXIDENT_CACHE moves it, set but
@@ -28,8 +34,8 @@ def start_jax(*, cache: bool = True) -> None:
     """
     jax.config.update("jax_enable_x64", True)
     flags = os.environ.get("XLA_FLAGS", "")
-    if "xla_backend_extra_options" not in flags:
-        os.environ["XLA_FLAGS"] = f"{flags} --xla_backend_extra_options={SHARE_WORK}".strip()
+    added = [f"--{name}={value}" for name, value in FLAGS.items() if name not in flags]
+    os.environ["XLA_FLAGS"] = " ".join([flags, *added]).strip()
     _keep_memory()
     folder = _cache_folder() if cache else ""
     if folder and _usable(folder):

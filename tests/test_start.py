@@ -60,7 +60,7 @@ def test_an_empty_cache_variable_turns_the_cache_off():
 def test_flags_of_the_user_are_kept():
     kept = outcome(JAXIDENT_CACHE="", XLA_FLAGS="--xla_cpu_enable_fast_math=false")[2]
     assert kept.startswith("--xla_cpu_enable_fast_math=false --xla_backend_extra_options=")
-    own = "--xla_backend_extra_options=xla_cpu_disable_slp_vectorizer"
+    own = "--xla_backend_extra_options=xla_cpu_disable_slp_vectorizer --xla_gpu_autotune_level=4"
     assert outcome(JAXIDENT_CACHE="", XLA_FLAGS=own)[2] == own
 
 

@@ -103,7 +103,8 @@ def _result(future: Any) -> tuple[int, Outcome]:
     except KilledWorker as error:
         raise WorkError(f"a chunk ended {RETRIES} workers or more: {error}") from None
     except (OSError, CancelledError) as error:
-        raise WorkError(f"the scheduler is gone ({type(error).__name__}); the same command goes on") from None
+        told = "with one that answers the study goes on where it stopped"
+        raise WorkError(f"the scheduler is gone ({type(error).__name__}); {told}") from None
 
 
 def _task(study: Study, number: int, expected: dict[str, str]) -> tuple[int, Outcome]:
