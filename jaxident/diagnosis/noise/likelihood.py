@@ -17,6 +17,7 @@ from jaxident.diagnosis.noise.law import (
     Law,
     answers_of,
     camera_parts,
+    finest,
     inverse_of_lower,
     memory_parts,
     numbers_of,
@@ -39,7 +40,8 @@ LEAST = 1e-4
 class Sample(NamedTuple):
     """Some windows and some of their numbers (windows, n). basis (windows, n, m): directions of these that no start
     state moves; along them the residuals (windows, m), what the camera's two variances multiply and what is unseen
-    (windows, m, m). squares (2,): mean squares of the residuals in position and heading."""
+    (windows, m, m). squares (2,): mean squares of the residuals in position and heading; least (2,): those of a white
+    error that no law falls below."""
 
     windows: Windows
     responses: Responses
@@ -49,6 +51,7 @@ class Sample(NamedTuple):
     camera: list[Any]
     unseen: Any
     squares: Any
+    least: Any
 
 
 class Structure(NamedTuple):
@@ -95,7 +98,12 @@ def sample(residual: Array, starts: Array, windows: Windows, responses: Response
     squares = np.array([np.mean(left[of] ** 2) for of in (numbers % 3 < 2, numbers % 3 == 2)])
     camera = [_along(each, basis) for each in camera_parts(own, numbers)]
     freed = (basis.transpose(0, 2, 1) @ left[..., None])[..., 0]
-    return Sample(own, part, numbers, basis, freed, camera, _along(of_unseen(own, numbers), basis), squares)
+    least = np.maximum(LEAST**2 * squares, np.square(finest(windows)))
+    alike = float(
+        np.sqrt(np.prod(np.maximum(squares, least)))
+    )  # beside a variance of 1 nothing small is left of others
+    unseen = alike * _along(of_unseen(own, numbers), basis)
+    return Sample(own, part, numbers, basis, freed, camera, unseen, squares, least)
 
 
 def _along(part: Array, basis: Array) -> np.ndarray:
@@ -156,7 +164,7 @@ def likeliest(given: Sample, structure: Structure, begin: Amounts, rival: float 
         for kind, count in zip(kinds, counts, strict=True)
     ])  # fmt: skip
     least = np.zeros(len(amounts))
-    least[:2] = LEAST**2 * given.squares * structure.units[:2]
+    least[:2] = given.least * structure.units[:2]
     found, value = _search(given, structure.parts, np.maximum(amounts, np.maximum(least, 1e-300)), least, rival)
     sd = np.sqrt(found / structure.units).tolist()
     slip = (sd[2], sd[3]) if structure.slip_time is not None else None

@@ -7,6 +7,7 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.diagnosis.fit.refit import Solution
 from jaxident.diagnosis.motion.windows import Windows
+from jaxident.diagnosis.noise.law import finest
 from jaxident.estimation.increments.observations import repeats
 from jaxident.log import Log
 
@@ -49,6 +50,7 @@ def find_outliers(log: Log, windows: Windows, solution: Solution) -> np.ndarray:
     whole = seen[:, 1:-1] & seen[:, 2:] & seen[:, :-2]
     apart = np.abs(residual[:, 2:] - residual[:, :-2])
     spread = np.array([np.median(np.abs(middle[..., k][whole])) / 0.6745 if whole.any() else 1.0 for k in range(3)])
+    spread = np.maximum(spread, _finest(windows))
     lonely = (np.abs(middle) > OUTLYING * spread) & (apart < 0.5 * np.abs(middle))
     window, row = np.nonzero(lonely.any(axis=2) & whole)
     found = np.zeros(len(log.t), bool)
@@ -63,7 +65,7 @@ def find_more_outliers(log: Log, windows: Windows, solution: Solution) -> np.nda
     rows = [np.flatnonzero(own) for own in np.asarray(windows.seen).T]
     pairs = [_beside(own[k]) for own, k in zip(residual, rows, strict=True)]
     apart, near = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
-    spread = np.quantile(np.abs(apart), 0.9, axis=0) / TAIL
+    spread = np.maximum(np.quantile(np.abs(apart), 0.9, axis=0) / TAIL, _finest(windows))
     hit = ((np.abs(apart) > LESS_OUTLYING * spread) & (near < 0.25 * np.abs(apart))).any(axis=1)
     found = np.zeros(len(log.t), bool)
     found[np.concatenate([place + k for place, k in zip(windows.row, rows, strict=True)])[hit]] = True
@@ -90,6 +92,12 @@ def frames_of(log: Log, frozen: Array, outlying: Array) -> Frames:
     turn = turn - 2.0 * np.pi * np.round(turn / (2.0 * np.pi))
     sizes = float(np.sqrt(np.mean(x**2 + y**2) / 2.0)), float(np.sqrt(np.mean(turn**2)))
     return Frames(frozen, outlying, sizes, poses)
+
+
+def _finest(windows: Windows) -> np.ndarray:
+    """The least error (3,) of a pose: of a log without noise all residuals are rounding, and some stand out."""
+    position, heading = finest(windows)
+    return np.array([position, position, heading])
 
 
 def _beside(values: Array) -> tuple[np.ndarray, np.ndarray]:
