@@ -99,6 +99,7 @@ def _regions(excess: Array, variables: dict[str, np.ndarray], seed: int = 0) -> 
     """Bins of each variable by its quantiles, tested by shuffling the excess over windows."""
     rng = np.random.default_rng(seed)
     shuffled = np.stack([rng.permutation(excess) for _ in range(SHUFFLES)])
+    whole = float(np.sum(np.maximum(excess, 0.0)))  # 0 where the floor is above every error
     found, table = [], {}
     for name, value in variables.items():
         edges = np.unique(np.quantile(value, np.linspace(0.0, 1.0, BINS + 1)))
@@ -109,7 +110,7 @@ def _regions(excess: Array, variables: dict[str, np.ndarray], seed: int = 0) -> 
         counts = np.maximum(members.sum(axis=1), 1)
         means = members @ excess / counts
         chance = (1.0 + np.sum(shuffled @ members.T / counts >= means - 1e-12, axis=0)) / (1.0 + SHUFFLES)
-        share = members @ excess / max(float(np.sum(np.maximum(excess, 0.0))), 1e-300)
+        share = members @ excess / whole if whole > 0.0 else 0.0 * means
         table[name] = edges, means
         found += [
             Region(name, float(edges[k]), float(edges[k + 1]), float(share[k]), float(chance[k]))

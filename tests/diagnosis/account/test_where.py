@@ -44,3 +44,9 @@ def test_a_turned_marker_looks_like_sideways_movement():
     np.testing.assert_allclose(seen[1], lateral * np.cos(0.1) - along * np.sin(0.1), atol=1e-12)
     np.testing.assert_allclose(seen[2], heading, atol=1e-12)
     assert np.abs(along).max() > 0.0
+
+
+def test_no_region_stands_out_where_the_floor_is_above_every_error():
+    rng = np.random.default_rng(0)
+    regions, _ = _regions(-1e10 * rng.uniform(size=80), {"v": rng.uniform(size=80)})
+    assert regions == []
