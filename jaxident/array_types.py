@@ -16,8 +16,39 @@ Parameters are small arrays, rows by channel and columns by wheel, as in the mod
 
 from typing import Any, NamedTuple
 
+from jaxtyping import Bool, Float
+
 Array = Any
 """A JAX array, or what JAX takes in its place: a NumPy array, a number. Docstrings say the shape."""
+
+# Arrays by their axes. Two arguments of one call that name an axis agree in its length. Nothing is checked when the
+# program runs; `JAXIDENT_CHECK_SHAPES=1 python -m pytest` checks calls (`tests/conftest.py`).
+Samples = Float[Array, "samples"]  # one number per row of a log
+SampleFlags = Bool[Array, "samples"]
+Signals = Float[Array, "n samples"]
+ChannelSamples = Float[Array, "2 samples"]  # along, heading
+PerWheel = Float[Array, "2 *trials"]  # right, left
+PerChannel = Float[Array, "2 *trials"]  # along, heading
+Gains = Float[Array, "2 2"]  # channels by wheels
+DifferenceVector = Float[Array, "12"]  # in DIFFERENCE_ORDER, see `robot.model`
+DifferenceMatrix = Float[Array, "12 12"]
+EquationUnknowns = Float[Array, "2 7"]  # of (15) and (16), see `estimation.increments.regressors`
+SearchPoint = Float[Array, "4"]  # both dead zones, both poles
+Unknowns = Float[Array, "unknowns"]  # of a likelihood, see `estimation.poses.parameters`
+UnknownsMatrix = Float[Array, "unknowns unknowns"]
+RobotVector = Float[Array, "8"]  # two rates, four gains, two dead zones
+RobotMatrix = Float[Array, "8 8"]
+StateVector = Float[Array, "5"]  # x, y, theta, v, w
+StateMatrix = Float[Array, "5 5"]
+PoseVector = Float[Array, "3"]  # x, y, theta
+PoseMatrix = Float[Array, "3 3"]
+Rows = Float[Array, "rows"]  # one number per row of a run
+PoseRows = Float[Array, "3 rows"]
+RunPoses = Float[Array, "runs 3 rows"]
+RunStates = Float[Array, "runs 5"]
+RunFlags = Bool[Array, "runs rows"]
+Column = Float[Array, "n"]
+Square = Float[Array, "n n"]
 
 
 class Wheels(NamedTuple):

@@ -8,7 +8,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from jaxident.array_types import Array
+from jaxident.array_types import Array, Column, Square
 
 # Gauss-Legendre rule on [0, 1] with four nodes: exact for polynomials of degree seven.
 GAUSS_NODES = (0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970263)
@@ -120,7 +120,7 @@ def hold_integrals(rate: Array, time: Array) -> tuple[Array, Array, Array]:
     return jnp.exp(z), time * first, time * time * second
 
 
-def solve_positive(matrix: Array, target: Array) -> Array:
+def solve_positive(matrix: Square, target: Column) -> Column:
     """The solution (n,) of a positive definite system (n, n), n a handful, by Gauss-Jordan elimination.
 
     Plain arithmetic runs over thousands of systems at once under vmap, where LAPACK would be called for each.

@@ -7,16 +7,49 @@ from collections.abc import Iterator
 import jax
 import pytest
 
+if "JAXIDENT_CHECK_SHAPES" in os.environ:  # types and shapes of every call; before any module of these is imported
+    from jaxtyping import install_import_hook
+
+    install_import_hook(["jaxident.numerics", "jaxident.robot", "jaxident.estimation"], "beartype.beartype")
+
 from jaxident.start import start_jax
 
 start_jax(cache="JAXIDENT_CACHE" in os.environ)  # as the program does; a folder given for it is fresh and the run's own
 
 SHARED = pathlib.Path(__file__).resolve().parents[2] / "shared"
 
+QUICK = (
+    "test_layers.py",
+    "test_numerics.py",
+    "robot/test_drive.py",
+    "robot/test_path_length.py",
+    "effects/test_records.py",
+    "estimation/increments/test_projection.py",
+    "estimation/poses/test_filter.py",
+    "estimation/suspicions/test_suspicions.py",
+    "study/test_engine.py",
+    "diagnosis/test_end_to_end.py",
+    "files/test_logs.py",
+    "files/test_models.py",
+    "export/test_targets.py",
+    "plot/test_look.py",
+    "report/test_diagnosis.py",
+    "cli/test_export.py",
+)
+"""Test files of the quick tier, at least one for each room, one whole diagnosis among them."""
+
 MAPS = pathlib.Path("/proc/self/maps")
 MANY = 20_000
 """Memory maps from which compiled programs are let go: each takes several, and Linux allows a process 65530. At 50778
 maps the tests of one process were nine tenths through; beyond the limit the process dies."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Gives the tests of the QUICK files the marker `quick`, apart from slow ones."""
+    files = {pathlib.Path(__file__).parent / name for name in QUICK}
+    for item in items:
+        if item.path in files and not item.get_closest_marker("slow"):
+            item.add_marker("quick")
 
 
 @pytest.fixture(autouse=True, scope="module")

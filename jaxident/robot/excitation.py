@@ -5,13 +5,13 @@ from collections.abc import Callable
 import jax
 import jax.numpy as jnp
 
-from jaxident.array_types import Array, Wheels
+from jaxident.array_types import Array, Samples, Wheels
 
 DWELL_LEVELS = (0.0, 0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 0.7, 0.5, 0.3, 0.2, 0.1)
 """One half-wave of the staircase, in amplitudes: as many levels in and around a usual dead zone as above it."""
 
 
-def staircase(key: Array, samples: int, amplitude: float = 1.0, hold: int = 20) -> Wheels:
+def staircase(key: Array, samples: int, amplitude: Array = 1.0, hold: int = 20) -> Wheels:
     """Levels in and around the dead zone, up and down in both directions, as in the paper's figure 7.
 
     The left wheel takes its levels in a drawn order, so that the two wheels do not move in step; each pass through
@@ -25,7 +25,7 @@ def staircase(key: Array, samples: int, amplitude: float = 1.0, hold: int = 20) 
     return Wheels(*(amplitude * _hold(levels, samples, hold) for levels in (right, left)))
 
 
-def multilevel(key: Array, samples: int, amplitude: float = 1.0, hold: int = 20) -> Wheels:
+def multilevel(key: Array, samples: int, amplitude: Array = 1.0, hold: int = 20) -> Wheels:
     """Levels uniform in [-amplitude, amplitude], each held `hold` samples."""
 
     def wave(k: Array) -> Array:
@@ -34,7 +34,7 @@ def multilevel(key: Array, samples: int, amplitude: float = 1.0, hold: int = 20)
     return _both(key, wave, amplitude)
 
 
-def prbs(key: Array, samples: int, amplitude: float = 1.0, hold: int = 20) -> Wheels:
+def prbs(key: Array, samples: int, amplitude: Array = 1.0, hold: int = 20) -> Wheels:
     """Pseudo-random binary: plus or minus the amplitude. Two levels cannot show a static curve or a dead zone."""
 
     def wave(k: Array) -> Array:
@@ -43,7 +43,7 @@ def prbs(key: Array, samples: int, amplitude: float = 1.0, hold: int = 20) -> Wh
     return _both(key, wave, amplitude)
 
 
-def multisine(key: Array, samples: int, amplitude: float = 1.0, hold: int = 20) -> Wheels:
+def multisine(key: Array, samples: int, amplitude: Array = 1.0, hold: int = 20) -> Wheels:
     """Odd harmonics of the run length with random phases, flat up to the band of the hold, peak at the amplitude."""
 
     def wave(k: Array) -> Array:
@@ -57,7 +57,7 @@ def multisine(key: Array, samples: int, amplitude: float = 1.0, hold: int = 20) 
     return _both(key, wave, amplitude)
 
 
-def chirp(key: Array, samples: int, amplitude: float = 1.0, hold: int = 20) -> Wheels:
+def chirp(key: Array, samples: int, amplitude: Array = 1.0, hold: int = 20) -> Wheels:
     """Sines whose frequency rises linearly from one period in the run to one period in 2 `hold` samples.
 
     The wheels are a quarter period apart: drawn apart, their phases could agree and the two move in step.
@@ -77,10 +77,10 @@ EXCITATIONS: dict[str, Callable[..., Wheels]] = {
 }
 
 
-def _both(key: Array, wave: Callable[[Array], Array], amplitude: float) -> Wheels:
+def _both(key: Array, wave: Callable[[Array], Array], amplitude: Array) -> Wheels:
     right, left = jax.random.split(key)
     return Wheels(amplitude * wave(right), amplitude * wave(left))
 
 
-def _hold(levels: Array, samples: int, hold: int) -> Array:
+def _hold(levels: Array, samples: int, hold: int) -> Samples:
     return levels[jnp.arange(samples) // hold]

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxident.array_types import Array
+from jaxident.array_types import DifferenceVector, PerWheel
 from jaxident.errors import InputError
 from jaxident.origin import Origin
 from jaxident.robot.difference import Difference, to_difference
@@ -137,6 +137,6 @@ def require_physical(model: Model) -> Physical:
     raise InputError("physical: null; this needs a model with physical parameters, not one of free numerators")
 
 
-def difference_vector(difference: Difference, dead_zone: Array) -> Array:
+def difference_vector(difference: Difference, dead_zone: PerWheel) -> DifferenceVector:
     """The twelve numbers of (13)-(14) and the dead zones as one array (12,), in DIFFERENCE_ORDER."""
     return jnp.concatenate([jnp.ravel(jnp.asarray(part)) for part in (*difference, dead_zone)])

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxident.array_types import Array, Pose
+from jaxident.array_types import Array, Pose, Samples
 from jaxident.robot.drive import Force
 
 
@@ -90,7 +90,7 @@ def draw_white(noise: Noise, key: Array, samples: int) -> UnitNoise | None:
     return draw_noise(jax.random.fold_in(key, WHITE), samples)
 
 
-def correlated(unit: Array, step: Array, time: Array) -> Array:
+def correlated(unit: Samples, step: Array, time: Array) -> Samples:
     """Stationary first-order autoregression of unit variance from unit noise (samples,), its correlation time in
     seconds; step [s] scalar, or (samples - 1,) between the rows."""
     memory = jnp.exp(-jnp.broadcast_to(step, (len(unit) - 1,)) / time)

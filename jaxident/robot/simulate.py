@@ -6,7 +6,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from jaxident.array_types import AT_REST, Array, Increment, Pose, State, Wheels
+from jaxident.array_types import AT_REST, Array, Increment, PerWheel, Pose, Samples, State, Wheels
 from jaxident.errors import InputError
 from jaxident.log import EVEN_TOLERANCE, Log, even_period, first_rows
 from jaxident.robot.dead_zone import effective_command
@@ -35,7 +35,7 @@ def simulate(model: Model, log: Log, *, start: State = AT_REST, key: Array | Non
 
 
 @jax.jit
-def _poses(model: Model, t: Array, command: Wheels, start: State, key: Array | None) -> Pose:
+def _poses(model: Model, t: Samples, command: Wheels, start: State, key: Array | None) -> Pose:
     unit = None if key is None else draw_noise(key, len(t))
     if isinstance(model.dynamics, Physical):
         step = jnp.diff(t)
@@ -90,13 +90,13 @@ def _run(solution: Hold, rows: Any, pull_of: Callable[[Any], Force], start: Stat
     return jax.lax.scan(body, start, (rows, steps, last))[1]
 
 
-def run_difference(difference: Difference, dead_zone: Array, command: Wheels, start: State, period: Array) -> Pose:
+def run_difference(difference: Difference, dead_zone: PerWheel, command: Wheels, start: State, period: Array) -> Pose:
     """Poses (samples,) by PAPER (13)-(14); before the first row nothing was commanded and the speed was `start`'s."""
     first = Increment(jnp.asarray(start.v) * period, jnp.asarray(start.w) * period)
     return follow(start.pose, free_run(difference, dead_zone, command, first))
 
 
-def free_run(difference: Difference, dead_zone: Array, command: Wheels, before: Increment) -> Increment:
+def free_run(difference: Difference, dead_zone: PerWheel, command: Wheels, before: Increment) -> Increment:
     """Increments (samples - 1,) between the rows, each from the model's own last one; `before` is the one that ended
     at the first row, when nothing was commanded yet."""
     passed = effective_command(Wheels(*(jnp.asarray(u)[:-1] for u in command)), dead_zone)

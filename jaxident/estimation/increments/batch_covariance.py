@@ -3,7 +3,7 @@
 import jax
 import jax.numpy as jnp
 
-from jaxident.array_types import Array, Increment
+from jaxident.array_types import Array, DifferenceMatrix, DifferenceVector, EquationUnknowns, Increment, Square
 from jaxident.estimation.increments import recursive
 from jaxident.estimation.increments.least_squares import full_covariance
 from jaxident.numerics import safe_divide, solve_positive
@@ -13,7 +13,7 @@ PLACES = (0, 2, 3, 6, 7, 10, 11), (1, 4, 5, 8, 9, 10, 11)
 """Each equation's pole, numerators and dead zones in DIFFERENCE_ORDER."""
 
 
-def batch_covariance(estimate: recursive.Estimate, variance: Increment) -> Array:
+def batch_covariance(estimate: recursive.Estimate, variance: Increment) -> DifferenceMatrix:
     """Covariance (12, 12) in DIFFERENCE_ORDER, to first order; variance: of each equation's residuals."""
     equations = (estimate.length, estimate.turn)
     unknowns = jnp.stack([jnp.stack(equation.unknowns) for equation in equations])
@@ -21,7 +21,7 @@ def batch_covariance(estimate: recursive.Estimate, variance: Increment) -> Array
     return pool(unknowns, jnp.stack(covariance))[1]
 
 
-def pool(unknowns: Array, covariance: Array) -> tuple[Array, Array]:
+def pool(unknowns: EquationUnknowns, covariance: Array) -> tuple[DifferenceVector, DifferenceMatrix]:
     """One estimate (12,) in DIFFERENCE_ORDER and its covariance (12, 12), to first order, from unknowns (2, 7) of both
     equations, in the order of `regressors`, and their covariances (2, 7, 7).
 
@@ -48,7 +48,7 @@ def _own_parameters(unknowns: Array) -> Array:
     return jnp.stack([pole, new_r, new_l, -old_r, -old_l, *ratios])
 
 
-def _inverse(matrix: Array) -> Array:
+def _inverse(matrix: Square) -> Square:
     """Of a covariance or an information (n, n) whose entries differ by many orders of magnitude."""
     scale = 1.0 / jnp.sqrt(jnp.maximum(jnp.diagonal(matrix), jnp.finfo(float).tiny))
     scaled = scale[:, None] * matrix * scale

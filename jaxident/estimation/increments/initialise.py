@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import lineax
 import optimistix
 
-from jaxident.array_types import Array, Increment
+from jaxident.array_types import Array, Increment, PerChannel, SearchPoint
 from jaxident.estimation.increments.input_forms import Reading, free_run, one_step, reading_of, usable
 from jaxident.estimation.increments.observations import Observations
 from jaxident.estimation.increments.projection import Projected, inputs_of, linear_residual, profile, project, triangle
@@ -114,7 +114,7 @@ def _initialise(observations: Observations, d_max: Array, reading: str) -> Setup
     )
 
 
-def _search(observations: Observations, weight: Array, d_max: Array, reading: str) -> tuple[Array, Array]:
+def _search(observations: Observations, weight: PerChannel, d_max: Array, reading: str) -> tuple[SearchPoint, Array]:
     """The lowest point (4,) of finer and finer windows, and which of its dead zones lie on a level of the commands."""
     sizes = jnp.abs(jnp.stack(observations.command))
     levels = jnp.where(sizes <= d_max, sizes, 0.0)
@@ -130,7 +130,7 @@ def _search(observations: Observations, weight: Array, d_max: Array, reading: st
     return point, jnp.any(levels == point[:2, None], axis=1)
 
 
-def _linear_weight(observations: Observations) -> tuple[Array, Array]:
+def _linear_weight(observations: Observations) -> tuple[PerChannel, Array]:
     """Root-mean-square residual (2,) of (19)-(20), the one-step fit without dead zones, and of how many samples."""
     read = one_step(observations)
     count = jnp.sum(usable(observations))
@@ -139,7 +139,7 @@ def _linear_weight(observations: Observations) -> tuple[Array, Array]:
     return jnp.maximum(jnp.sqrt(mean), SMALLEST_WEIGHT), count
 
 
-def _cost(observations: Observations, reading: Reading, weight: Array) -> Cost:
+def _cost(observations: Observations, reading: Reading, weight: PerChannel) -> Cost:
     limit = jnp.abs(reading.pole(jnp.asarray(jnp.inf))) * POLE_LIMIT
     inputs, increments = inputs_of(observations), jnp.stack(observations.increment)
 
@@ -150,14 +150,14 @@ def _cost(observations: Observations, reading: Reading, weight: Array) -> Cost:
     return Cost(lambda point: project(reading, observations, point), around, weight)
 
 
-def _best_poles(cost: Cost, point: Array) -> Array:
+def _best_poles(cost: Cost, point: SearchPoint) -> PerChannel:
     """For each channel the best (2,) of POLES: given the dead zones, the channels share nothing."""
     poles = jnp.asarray(POLES)
     left = jax.vmap(lambda pole: cost.left(point.at[2:].set(pole)).residual)(poles)
     return poles[jnp.argmin(jnp.sum(left**2, axis=2), axis=0)]
 
 
-def _zoom(cost: Cost, point: Array, levels: Array, d_max: Array, halves: Array, count: int) -> Array:
+def _zoom(cost: Cost, point: SearchPoint, levels: Array, d_max: Array, halves: Array, count: int) -> SearchPoint:
     """The lowest point (4,) that windows of some half-widths (n,) find, each around the best of the one before.
 
     A window holds `count` dead zones of either wheel and the level of its commands, levels (2, n), that lies nearest
@@ -176,7 +176,7 @@ def _zoom(cost: Cost, point: Array, levels: Array, d_max: Array, halves: Array, 
     return jax.lax.scan(look, point, halves)[0]
 
 
-def _refine(cost: Cost, reading: Reading, d_max: Array, start: Array, held: Array) -> tuple[Array, Array]:
+def _refine(cost: Cost, reading: Reading, d_max: Array, start: SearchPoint, held: Array) -> tuple[SearchPoint, Array]:
     """Levenberg-Marquardt from one point, in coordinates that cannot leave the bounds: the end, and the steps.
 
     held (2,): dead zones that stay. The residuals and their slopes go to the search as four numbers a channel with

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxident.array_types import Array
+from jaxident.array_types import Array, SampleFlags, Signals
 from jaxident.errors import InputError
 from jaxident.estimation.increments.observations import Observations
 from jaxident.numerics import safe_divide
@@ -45,7 +45,7 @@ def reading_of(observations: Observations, name: str) -> Reading:
     return one_step(observations) if name == "one_step" else free_run(observations)
 
 
-def usable(observations: Observations) -> Array:
+def usable(observations: Observations) -> SampleFlags:
     """Samples whose increment and the one before each span a single sample: three poses in a row."""
     single = observations.measured & (observations.first | earlier(observations.seen))
     return single & ~observations.first & earlier(single)
@@ -106,7 +106,7 @@ def _runs(observations: Observations) -> _Runs:
     return _Runs(jnp.cumsum(first | seam) - 1, first, first | seam | earlier(observations.seen), observations.measured)
 
 
-def _respond(runs: _Runs, pole: Array, drive: Array) -> tuple[Array, Array]:
+def _respond(runs: _Runs, pole: Array, drive: Signals) -> tuple[Signals, Signals]:
     """Increments (n, samples) under a drive, whose first sample in a run is the run's start, and the same summed
     since the last pose where one is measured."""
 
@@ -122,7 +122,7 @@ def _respond(runs: _Runs, pole: Array, drive: Array) -> tuple[Array, Array]:
     return own.T, jnp.where(runs.measured, summed.T, 0.0)
 
 
-def _shares(runs: _Runs, start: Array, signals: Array) -> Array:
+def _shares(runs: _Runs, start: Array, signals: Signals) -> Array:
     """How much of the start's response each run of signals (n, samples) holds, at every sample of the run."""
 
     def over_run(values: Array) -> Array:

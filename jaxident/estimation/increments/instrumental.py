@@ -12,7 +12,7 @@ zones by key-term separation as in `key_term_fit`.
 import jax
 import jax.numpy as jnp
 
-from jaxident.array_types import Array
+from jaxident.array_types import Array, DifferenceMatrix, DifferenceVector, EquationUnknowns, PerWheel, Signals
 from jaxident.estimation.increments.batch_covariance import pool
 from jaxident.estimation.increments.input_forms import earlier
 from jaxident.estimation.increments.key_term_fit import (
@@ -57,7 +57,9 @@ def fit_instrumental(observations: Observations, *, d_max: Array, rounds: int = 
     return in_blocks(one, BLOCK)(observations, jnp.asarray(d_max))
 
 
-def _round(observations: Observations, unknowns: Array, width: Array, summed: Array) -> tuple[Array, Array, Array]:
+def _round(
+    observations: Observations, unknowns: EquationUnknowns, width: PerWheel, summed: Array
+) -> tuple[DifferenceVector, DifferenceMatrix, EquationUnknowns]:
     """One round from unknowns (2, 7) and dead zones (2,) of the last: pooled estimate, covariance, unknowns; summed:
     whether the heading's is."""
     inputs = input_columns(observations, width)[:, 1:]
@@ -81,7 +83,7 @@ def _round(observations: Observations, unknowns: Array, width: Array, summed: Ar
     return (*pool(found, spread), found)
 
 
-def _decay(pole: Array, signals: Array) -> Array:
+def _decay(pole: Array, signals: Signals) -> Signals:
     """Signals (n, samples) through 1 / (1 - pole q^-1), from rest."""
 
     def body(last, now):

@@ -11,7 +11,20 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxident.array_types import Array, Wheels
+from jaxident.array_types import (
+    Array,
+    ChannelSamples,
+    Column,
+    DifferenceMatrix,
+    DifferenceVector,
+    EquationUnknowns,
+    PerWheel,
+    SampleFlags,
+    Samples,
+    Signals,
+    Square,
+    Wheels,
+)
 from jaxident.estimation.increments.batch_covariance import pool
 from jaxident.estimation.increments.input_forms import earlier, usable
 from jaxident.estimation.increments.observations import Observations
@@ -59,32 +72,32 @@ def fit_key_terms(observations: Observations, *, d_max: Array, rounds: int = ROU
     return in_blocks(one, BLOCK)(observations, jnp.asarray(d_max))
 
 
-def no_estimate() -> tuple[Array, Array, Array]:
+def no_estimate() -> tuple[DifferenceVector, DifferenceMatrix, EquationUnknowns]:
     """What a round finds, before the first: estimate (12,), covariance (12, 12), unknowns (2, 7)."""
     size = len(DIFFERENCE_ORDER)
     return jnp.zeros(size), jnp.zeros((size, size)), jnp.zeros((2, UNKNOWNS))
 
 
-def usable_rows(observations: Observations) -> Array:
+def usable_rows(observations: Observations) -> SampleFlags:
     """Samples (samples,) with a measured increment of their own and one before."""
     if observations.measured is None:
         return jnp.arange(len(observations.increment.length)) > 0
     return usable(observations)
 
 
-def step_towards(width: Array, found: Array, d_max: Array) -> Array:
+def step_towards(width: PerWheel, found: PerWheel, d_max: Array) -> PerWheel:
     """The dead zones (2,) of the next round. Where none were found, too few samples were left outside of the last: back
     towards 0."""
     aim = jnp.where(jnp.isfinite(found), jnp.clip(found, 0.0, d_max), 0.0)
     return width + RELAXATION * (aim - width)
 
 
-def input_columns(observations: Observations, width: Array) -> Array:
+def input_columns(observations: Observations, width: PerWheel) -> Array:
     """The six columns (6, samples) of (15)-(16) that come from commands, at dead zones (2,)."""
     return jnp.stack(key_terms(jnp.zeros(()), observations.command, observations.command_before, Wheels(*width))[1:])
 
 
-def finish(found: tuple[Array, Array, Array], count: Array, d_max: Array) -> Batch:
+def finish(found: tuple[DifferenceVector, DifferenceMatrix, EquationUnknowns], count: Array, d_max: Array) -> Batch:
     """The result of a last round on `count` samples, dead zones within their bounds."""
     estimate, covariance, unknowns = found
     estimate = estimate.at[10:].set(jnp.clip(estimate[10:], 0.0, d_max))
@@ -92,7 +105,7 @@ def finish(found: tuple[Array, Array, Array], count: Array, d_max: Array) -> Bat
     return Batch(estimate, covariance, unknowns, finite & (count > UNKNOWNS))
 
 
-def solve_instrumental(instruments: Array, columns: Array, target: Array) -> tuple[Array, Array]:
+def solve_instrumental(instruments: Signals, columns: Signals, target: Samples) -> tuple[Column, Square]:
     """Weights (n,) of columns (n, samples) in a target (samples,) with Z (target - columns' w) = 0 for the instruments
     Z, and their covariance (n, n) where what is left is white; the columns themselves as instruments make it least
     squares.
@@ -113,7 +126,9 @@ def solve_instrumental(instruments: Array, columns: Array, target: Array) -> tup
     return weights * wide, spread * wide * wide[:, None]
 
 
-def _round(observations: Observations, use: Array, increments: Array, width: Array) -> tuple[Array, Array, Array]:
+def _round(
+    observations: Observations, use: SampleFlags, increments: ChannelSamples, width: PerWheel
+) -> tuple[DifferenceVector, DifferenceMatrix, EquationUnknowns]:
     """Least squares in both equations at given dead zones: pooled estimate, covariance, unknowns."""
     inputs = jnp.where(use, input_columns(observations, width), 0.0)
 

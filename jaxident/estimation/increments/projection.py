@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxident.array_types import Array
+from jaxident.array_types import Array, ChannelSamples, Column, Samples, SearchPoint, Signals, Square
 from jaxident.estimation.increments.input_forms import Reading
 from jaxident.estimation.increments.observations import Observations
 from jaxident.numerics import safe_divide
@@ -30,7 +30,7 @@ class Projected(NamedTuple):
     products: Any
 
 
-def project(reading: Reading, observations: Observations, point: Array) -> Projected:
+def project(reading: Reading, observations: Observations, point: SearchPoint) -> Projected:
     """What is left at a point (4,), and how it changes around it."""
     commands = jnp.stack([*observations.command, *observations.command_before])
     widths = jnp.tile(point[:2], 2)[:, None]
@@ -56,7 +56,7 @@ def project(reading: Reading, observations: Observations, point: Array) -> Proje
     return jax.vmap(channel)(point[2:], jnp.stack(observations.increment))
 
 
-def _mixture(first: Array) -> Array:
+def _mixture(first: SearchPoint) -> Array:
     """The residual's slopes by either dead zone and the pole, and the residual, as mixtures (4, 10) of four passed
     inputs, their four switches, the prediction's slope by the pole, and the residual; first (4,): the weights."""
     wheels = -jnp.tile(jnp.eye(2), 2) * first
@@ -65,7 +65,7 @@ def _mixture(first: Array) -> Array:
     )
 
 
-def linear_residual(reading: Reading, observations: Observations, increments: Array) -> Array:
+def linear_residual(reading: Reading, observations: Observations, increments: Samples) -> Samples:
     """What a fit of one channel without dead zones leaves, (samples,), the pole among its coefficients."""
     commands = jnp.stack([*observations.command, *observations.command_before])
     regression = reading.regress(jnp.zeros(()), commands, increments)
@@ -73,12 +73,12 @@ def linear_residual(reading: Reading, observations: Observations, increments: Ar
     return regression.target - _fit(columns, regression.target) @ columns
 
 
-def _fit(columns: Array, target: Array) -> Array:
+def _fit(columns: Signals, target: Samples) -> Column:
     """Least-squares weights (n,) of columns (n, samples) in a target (samples,)."""
     return _weights(columns @ columns.T, (columns @ target)[:, None])[0][0]
 
 
-def _weights(own: Array, across: Array, among: Array | None = None) -> tuple[Array, Array]:
+def _weights(own: Square, across: Array, among: Array | None = None) -> tuple[Array, Array]:
     """From inner products of n columns (n, n), of these with t targets (n, t), and of the targets (t, t): weights
     (t, n), and the inner products (t, t) of what they leave."""
     n, t = across.shape
@@ -87,7 +87,7 @@ def _weights(own: Array, across: Array, among: Array | None = None) -> tuple[Arr
     return table[:n, n:].T, table[n:, n:]
 
 
-def triangle(products: Array) -> Array:
+def triangle(products: Square) -> Square:
     """The upper triangular R (n, n) with R' R = products (n, n): n numbers a signal that stand for its samples where
     inner products alone count. Dependent signals leave zeros."""
     left, rows = products, []
@@ -119,7 +119,9 @@ def inputs_of(observations: Observations) -> Array:
     return jnp.stack([jnp.stack(pair) for pair in pairs])
 
 
-def profile(reading: Reading, inputs: Array, increments: Array, point: Array, rights: Array, lefts: Array):
+def profile(
+    reading: Reading, inputs: Array, increments: ChannelSamples, point: SearchPoint, rights: Column, lefts: Array
+):
     """Sums of squared residuals and best poles, both (2, n, m), for all pairs of n right and m left dead zones.
 
     inputs (2, 2, samples) as `inputs_of` lays them out, increments (2, samples). The poles are eliminated like the
@@ -141,7 +143,7 @@ def profile(reading: Reading, inputs: Array, increments: Array, point: Array, ri
     return jax.vmap(channel)(point[2:], increments)
 
 
-def _pass(commands: Array, widths: Array) -> Array:
+def _pass(commands: ChannelSamples, widths: Column) -> Array:
     """What passes n dead zones of one wheel's commands (2, samples): (2 n, samples), those of k-1 first."""
     now, limits = commands[:, None], widths[:, None]
     return (now - jnp.clip(now, -limits, limits)).reshape(-1, commands.shape[1])
@@ -166,7 +168,7 @@ def _schur(products: Products, count: int, size: int) -> Products:
     return left
 
 
-def _pairs(right: Array, left: Array, behind: Array) -> Products:
+def _pairs(right: Array, left: Array, behind: ChannelSamples) -> Products:
     """Inner products of two signals each of right (2 n, samples), left (2 m, samples) and behind (2, samples), for
     every pair of a right and a left dead zone: entries broadcast to (n, m). The signals of k-1 come first, then those
     of k-2. Products of inputs alone are shared where their channels are."""

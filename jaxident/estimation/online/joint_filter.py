@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxident.array_types import Array, Pose
+from jaxident.array_types import Array, Pose, PoseVector, RobotMatrix, RobotVector
 from jaxident.array_types import State as Motion
 from jaxident.errors import InputError
 from jaxident.estimation.online.joint_start import begin_from_model, begin_from_run, unsure
@@ -144,7 +144,7 @@ def step(state: State, sample: Sample) -> tuple[State, Info]:
     return after, Info(Pose(*error), used & good, lost, ok)
 
 
-def estimate(state: State) -> tuple[Array, Array]:
+def estimate(state: State) -> tuple[RobotVector, RobotMatrix]:
     """Rates [1/s], gains and dead zones (8,) in the order of `parameters.NAMES`, and their covariance (8, 8)."""
     values = state.belief.mean[-PARAMETERS:]
     scale = jnp.concatenate([jnp.exp(values[:2]), jnp.ones(PARAMETERS - 2)])
@@ -169,7 +169,7 @@ def _state(belief, noise, coupling, widest, d_max, memory, command, t, strikes, 
     return State(belief, noise, coupling, Drift(memory, widest), d_max, command, t, jnp.asarray(strikes, int), sound)
 
 
-def _search_at(belief: Belief, pose: Array, noise: Noise) -> Belief:
+def _search_at(belief: Belief, pose: PoseVector, noise: Noise) -> Belief:
     """The belief of a robot that may be anywhere near a pose at any speed; what is known of its parameters stays."""
     free = unsure(Motion(pose[0], pose[1], pose[2], 0.0, 0.0), noise)
     states = len(free.mean)

@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxident.array_types import Array, Wheels
+from jaxident.array_types import Array, RobotMatrix, RobotVector, Wheels
 from jaxident.array_types import State as Motion
 from jaxident.errors import InputError
 from jaxident.estimation.online.joint_step import PARAMETERS
@@ -22,7 +22,7 @@ WIDE = (1.0, 1.0, 1.0, 10.0, 10.0)
 """Standard deviations of a state before any pose is seen [m, m, rad, m/s, rad/s]: wider than any robot meant here."""
 
 
-def begin_from_run(run: Runs, d_max: Array, law: Law) -> tuple[Belief, Noise, Array, Array]:
+def begin_from_run(run: Runs, d_max: Array, law: Law) -> tuple[Belief, Noise, RobotVector, Array]:
     """Belief, noise law, and widest variances (PARAMETERS,) after a setup run (rows,), and whether the fit arrived and
     told every parameter better than its widest variance does: from a ridge the filter does not find back.
 
@@ -42,7 +42,9 @@ def begin_from_run(run: Runs, d_max: Array, law: Law) -> tuple[Belief, Noise, Ar
     return belief, noise, widest, fit.ok & told
 
 
-def at_the_end(vector: Array, covariance: Array, run: Runs, start: Motion, noise: Noise, coupling) -> Belief:
+def at_the_end(
+    vector: RobotVector, covariance: RobotMatrix, run: Runs, start: Motion, noise: Noise, coupling
+) -> Belief:
     """State and parameters after the last pose of a run (rows,): parameters (PARAMETERS,) and their covariance from
     elsewhere, the state from the poses; `start` is where its filter is linearised before the first pose."""
 
@@ -59,7 +61,7 @@ def at_the_end(vector: Array, covariance: Array, run: Runs, start: Motion, noise
     return Belief(jnp.concatenate([mean, vector]), whole)
 
 
-def begin_from_model(model: Model, d_max: Array) -> tuple[Belief, Noise, Array]:
+def begin_from_model(model: Model, d_max: Array) -> tuple[Belief, Noise, RobotVector]:
     """Belief, noise law and widest variances (PARAMETERS,) of a model with covariance; its state is still unknown."""
     drive, noise = require_physical(model), model.noise
     if model.covariance is None:
@@ -75,7 +77,7 @@ def begin_from_model(model: Model, d_max: Array) -> tuple[Belief, Noise, Array]:
     return Belief(jnp.concatenate([state.mean, vector]), whole), noise, widest
 
 
-def parameter_covariance(model: Model) -> Array:
+def parameter_covariance(model: Model) -> RobotMatrix:
     """Covariance (PARAMETERS, PARAMETERS) of the rates, gains and dead zones of a physical model, natural units."""
     rows = np.array([model.parameter_order.index(name) for name in NAMES[:PARAMETERS]])
     return jnp.asarray(model.covariance)[np.ix_(rows, rows)]
@@ -87,14 +89,14 @@ def unsure(state: Motion, noise: Noise) -> Belief:
     return belief._replace(covariance=belief.covariance.at[:5, :5].set(jnp.diag(jnp.array(WIDE) ** 2)))
 
 
-def widest_variance(vector: Array, d_max: Array) -> Array:
+def widest_variance(vector: RobotVector, d_max: Array) -> RobotVector:
     """The variance (PARAMETERS,) that no parameter exceeds: a factor e in a rate, the larger gain of its row, half the
     bound of a dead zone."""
     gain = jnp.max(jnp.abs(vector[2:6].reshape(2, 2)), axis=1)
     return jnp.concatenate([jnp.ones(2), jnp.repeat(gain, 2), jnp.full(2, 0.5 * d_max)]) ** 2
 
 
-def narrowed(covariance: Array, vector: Array, widest: Array) -> Array:
+def narrowed(covariance: RobotMatrix, vector: RobotVector, widest: RobotVector) -> RobotMatrix:
     """A covariance (PARAMETERS, PARAMETERS) in natural units as that of a vector, no wider than the widest: a
     parameter that the setup did not show gets a variance that the filter can compute with."""
     natural = natural_scale(vector)
@@ -105,6 +107,6 @@ def narrowed(covariance: Array, vector: Array, widest: Array) -> Array:
     return (vectors * (values / (1.0 + values))) @ vectors.T * back * back[:, None]
 
 
-def natural_scale(vector: Array) -> Array:
+def natural_scale(vector: RobotVector) -> RobotVector:
     """Natural units (PARAMETERS,) per unit of a vector, whose rates are logarithms."""
     return jnp.concatenate([jnp.exp(vector[:2]), jnp.ones(PARAMETERS - 2)])

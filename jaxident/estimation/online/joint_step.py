@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 from jax.scipy.stats import norm
 
-from jaxident.array_types import Array
+from jaxident.array_types import Array, PerWheel
 from jaxident.estimation.poses.filter import Belief, advance_with_slopes, step_weights
 from jaxident.robot.drive import Physical, hold
 from jaxident.robot.noise import Noise
@@ -24,7 +24,7 @@ class Drift(NamedTuple):
 
 
 def advance_belief(
-    belief: Belief, command: Array, step: Array, noise: Noise, coupling: Any, drift: Drift | None
+    belief: Belief, command: PerWheel, step: Array, noise: Noise, coupling: Any, drift: Drift | None
 ) -> Belief:
     """The belief one step [s] later under a held command (2,); `coupling` (2,) is known, or None.
 
@@ -61,7 +61,7 @@ def advance_belief(
     return Belief(mean, covariance if drift is None else _forget(covariance, step, drift))
 
 
-def expected_output(command: Array, width: Array, deviation: Array) -> tuple[Array, Array]:
+def expected_output(command: PerWheel, width: PerWheel, deviation: PerWheel) -> tuple[PerWheel, PerWheel]:
     """Mean output of dead zones of Gaussian width, and its mean slope by the width; all (2,).
 
     For u > 0 and z = (u - D) / s: s (z Phi(z) + phi(z)) and -Phi(z), odd in u. An uncertain edge near a level has

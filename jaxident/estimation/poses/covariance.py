@@ -2,24 +2,24 @@
 
 import jax.numpy as jnp
 
-from jaxident.array_types import Array
+from jaxident.array_types import Unknowns, UnknownsMatrix
 from jaxident.estimation.poses.parameters import Law, is_logarithmic, names
 from jaxident.estimation.poses.prior import FLAT, Prior, posterior
 from jaxident.estimation.poses.scoring import Damping, Local, Point, eliminate, with_prior
 
 
-def data_curvature(local: Local, law: Law) -> Array:
+def data_curvature(local: Local, law: Law) -> UnknownsMatrix:
     """Expected curvature (unknowns, unknowns) of the shared unknowns, start states eliminated."""
     return eliminate(local, Damping(0.0, 0.0), jnp.zeros(len(names(law)), bool))[0]
 
 
-def posterior_at(point: Point, local: Local, law: Law, prior: Prior) -> tuple[Array, Array]:
+def posterior_at(point: Point, local: Local, law: Law, prior: Prior) -> tuple[UnknownsMatrix, Unknowns]:
     """Covariance and the prior's share of each variance, as `posterior` gives them, where a search has ended; its
     `local` holds the prior's terms."""
     return posterior(data_curvature(with_prior(local, point.shared, law, prior, -1.0), law), point.shared, law, prior)
 
 
-def covariance_at(point: Point, local: Local, law: Law) -> Array:
+def covariance_at(point: Point, local: Local, law: Law) -> UnknownsMatrix:
     """Covariance (unknowns, unknowns) of the shared unknowns in natural units, start states and noise law as nuisance:
     the inverse of the expected curvature.
 

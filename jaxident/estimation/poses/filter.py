@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxident.array_types import Array, State
+from jaxident.array_types import Array, PerChannel, PoseRows, PoseVector, State, StateMatrix, StateVector
 from jaxident.numerics import GAUSS_WEIGHTS, sin_cos, wrap
 from jaxident.robot.drive import Force, Hold, Response
 from jaxident.robot.noise import Noise
@@ -23,7 +23,7 @@ class Belief(NamedTuple):
     covariance: Any
 
 
-def filter_run(solution: Hold, pull: Force, start: State, noise: Noise, run) -> tuple[Array, Array]:
+def filter_run(solution: Hold, pull: Force, start: State, noise: Noise, run) -> tuple[PoseRows, PoseRows]:
     """Normalised innovations and log variances (3, rows) of one run (rows,), the start state taken as known.
 
     `solution` is that of one step, or of each (rows - 1,); `pull` (rows,).
@@ -80,8 +80,8 @@ def step_weights(solution: Hold) -> StepWeights:
 
 
 def take_in(
-    belief: Belief, pose: Array, seen: Array, noise: Noise, limit: float | None = None
-) -> tuple[Belief, tuple[Array, Array]]:
+    belief: Belief, pose: PoseVector, seen: Array, noise: Noise, limit: float | None = None
+) -> tuple[Belief, tuple[PoseVector, PoseVector]]:
     """The belief after a pose (3,), and its normalised innovations and log variances (3,); 0 where unseen.
 
     limit: standard deviations beyond which an innovation counts no more than one of that size (Huber 1964).
@@ -103,7 +103,7 @@ def take_in(
     return Belief(mean, covariance), (normalised, log_variance)
 
 
-def predict_belief(belief: Belief, pull: Array, weights: StepWeights, noise: Noise) -> Belief:
+def predict_belief(belief: Belief, pull: PerChannel, weights: StepWeights, noise: Noise) -> Belief:
     """The belief one step later under accelerations (2,) along and in heading."""
     state, transition, entry = advance_with_slopes(belief.mean[:5], pull, weights)
     entry = entry * (jnp.stack([noise.slip_along, noise.slip_heading]) / jnp.sqrt(weights.step))
@@ -121,7 +121,9 @@ def predict_belief(belief: Belief, pull: Array, weights: StepWeights, noise: Noi
     return Belief(mean, covariance + jnp.diag(jnp.concatenate([jnp.zeros(5), fresh])))
 
 
-def advance_with_slopes(state: Array, pull: Array, weights: StepWeights) -> tuple[Array, Array, Array]:
+def advance_with_slopes(
+    state: StateVector, pull: PerChannel, weights: StepWeights
+) -> tuple[StateVector, StateMatrix, Array]:
     """The state (5,) one step later, its derivatives by the state (5, 5), and by a held acceleration (5, 2)."""
     start = jnp.concatenate([state[3:], pull])
     gauss = weights.step * jnp.asarray(GAUSS_WEIGHTS)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxident.array_types import Array, Pose, State, Wheels
+from jaxident.array_types import Array, Pose, State, StateVector, Unknowns, Wheels
 from jaxident.estimation.poses.filter import filter_run
 from jaxident.estimation.poses.parameters import Law, from_vector, names
 from jaxident.estimation.poses.runs import Runs, row_times
@@ -38,7 +38,7 @@ class Innovations(NamedTuple):
         return [parts[0] if len(parts) == 1 else jnp.concatenate(parts) for parts in kept]
 
 
-def innovations(vector: Array, start: Array, run: Runs, law: Law) -> Innovations:
+def innovations(vector: Unknowns, start: StateVector, run: Runs, law: Law) -> Innovations:
     """Innovations of one run (rows,) from its start state (5,) = x, y, theta, v, w at the first row."""
     robot = from_vector(vector, law)
     pull = force(robot.drive, effective_command(Wheels(*run.command), robot.dead_zone))
@@ -63,7 +63,7 @@ def pose_error(measured: Pose, pose: Pose) -> Array:
     return jnp.stack([measured.x - pose.x, measured.y - pose.y, wrap(measured.theta - pose.theta)])
 
 
-def deviation_steps(found: Innovations, runs: Runs, law: Law) -> Array:
+def deviation_steps(found: Innovations, runs: Runs, law: Law) -> Unknowns:
     """What to add to a vector (unknowns,) so that the deviations of white errors stand at their optimum, all else as it
     is: in closed form from the innovations of all runs (runs, 3, rows). The camera's have none with slip."""
     step = jnp.zeros(len(names(law)))

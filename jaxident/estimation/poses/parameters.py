@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 
-from jaxident.array_types import Array
+from jaxident.array_types import Array, Unknowns
 from jaxident.robot.drive import Physical
 from jaxident.robot.noise import Noise
 from jaxident.robot.wheel_sensor import WheelSensor
@@ -61,7 +61,7 @@ def is_logarithmic(law: Law) -> Array:
     return jnp.array([name in _LOGARITHMIC for name in names(law)])
 
 
-def to_vector(robot: Robot, law: Law) -> Array:
+def to_vector(robot: Robot, law: Law) -> Unknowns:
     """The vector (unknowns,) of a robot; terms that the law has not are left out."""
     coupling = (0.0, 0.0) if robot.drive.coupling is None else robot.drive.coupling
     noise = robot.noise
@@ -79,7 +79,7 @@ def to_vector(robot: Robot, law: Law) -> Array:
     return jnp.clip(jnp.stack([v for name, v in zip(NAMES, values, strict=True) if name in kept]), low, high)
 
 
-def from_vector(vector: Array, law: Law) -> Robot:
+def from_vector(vector: Unknowns, law: Law) -> Robot:
     """The robot of a vector (unknowns,)."""
     found = dict(zip(names(law), vector, strict=True))
     value = {name: jnp.exp(v) if name in _LOGARITHMIC else v for name, v in found.items()}
@@ -99,7 +99,7 @@ def from_vector(vector: Array, law: Law) -> Robot:
     return Robot(drive, (value["dead_zone_r"], value["dead_zone_l"]), noise, sensor)
 
 
-def bounds(law: Law, d_max: Array) -> tuple[Array, Array]:
+def bounds(law: Law, d_max: Array) -> tuple[Unknowns, Unknowns]:
     """Lowest and highest vector (unknowns,) that a search may visit; dead zones end at d_max."""
 
     def limits(table: dict[str, float], free: float, dead_zone: Array) -> Array:

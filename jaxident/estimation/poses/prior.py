@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxident.array_types import Array
+from jaxident.array_types import Array, Column, Gains, Rows, Square, Unknowns, UnknownsMatrix
 from jaxident.estimation.poses.parameters import Law, is_logarithmic, names
 from jaxident.estimation.poses.runs import Runs, row_times
 from jaxident.numerics import safe_divide, sin_cos, wrap
@@ -84,7 +84,7 @@ def speeds(runs: Runs) -> tuple[Array, Array]:
     return size(path), size(heading)
 
 
-def _travelled(run: Runs) -> tuple[Array, Array, Array]:
+def _travelled(run: Runs) -> tuple[Rows, Rows, Rows]:
     """Signed path [m], heading [rad] and time [s] (rows,) of one run up to the last pose seen at each row."""
     rows = jnp.arange(run.seen.shape[0])
     now = jax.lax.cummax(jnp.where(run.seen, rows, -1))
@@ -97,17 +97,17 @@ def _travelled(run: Runs) -> tuple[Array, Array, Array]:
     return jnp.cumsum(x * cosine + y * sine), jnp.cumsum(turn), row_times(run)[now]
 
 
-def middle_gain(prior: Prior) -> Array:
+def middle_gain(prior: Prior) -> Gains:
     """Gains (2, 2) at the prior's middle."""
     return RATE * _steady_speeds(prior)
 
 
-def _steady_speeds(prior: Prior) -> Array:
+def _steady_speeds(prior: Prior) -> Gains:
     """Steady speeds per command (2, 2) at the prior's middle [m/s, rad/s per unit]."""
     return SPEED * prior.speed / prior.command * jnp.array(SIGNS) / jnp.array([[1.0], [HALF_TRACK]])
 
 
-def departures(shared: Array, law: Law, prior: Prior) -> Array:
+def departures(shared: Unknowns, law: Law, prior: Prior) -> Array:
     """How far a vector (unknowns,) of shared unknowns departs from the prior, in its deviations, one after the other:
     two rates, four steady speeds, two dead zones, and two couplings, radius and track where the law has them."""
     firmness = jnp.where(prior.held, FIRMLY, 1.0)
@@ -123,7 +123,7 @@ def departures(shared: Array, law: Law, prior: Prior) -> Array:
     return prior.weight * jnp.concatenate(parts)
 
 
-def prior_terms(shared: Array, law: Law, prior: Prior) -> tuple[Array, Array, Array]:
+def prior_terms(shared: Unknowns, law: Law, prior: Prior) -> tuple[Array, Unknowns, UnknownsMatrix]:
     """Half the squared departures, their gradient (unknowns,) and curvature (unknowns, unknowns) without second
     derivatives."""
 
@@ -135,7 +135,7 @@ def prior_terms(shared: Array, law: Law, prior: Prior) -> tuple[Array, Array, Ar
     return 0.5 * jnp.sum(found**2), slope.T @ found, slope.T @ slope
 
 
-def posterior(data: Array, shared: Array, law: Law, prior: Prior) -> tuple[Array, Array]:
+def posterior(data: UnknownsMatrix, shared: Unknowns, law: Law, prior: Prior) -> tuple[UnknownsMatrix, Unknowns]:
     """Covariance (unknowns, unknowns) in natural units from the data's curvature of the shared unknowns, start states
     eliminated, and the prior's; and the share (unknowns,) of each variance that is the prior's.
 
@@ -155,7 +155,7 @@ def posterior(data: Array, shared: Array, law: Law, prior: Prior) -> tuple[Array
     return natural[:, None] * covariance * natural, jnp.clip(share, 0.0, 1.0)
 
 
-def _strike(whole: Array, held: Array) -> Array:
+def _strike(whole: Square, held: Column) -> Square:
     """A curvature (n, n) in which held unknowns (n,), 1 or 0, know no more than the prior once all others are free."""
     free = 1.0 - held
     others = whole * free[:, None] * free + jnp.diag(held)
@@ -164,7 +164,7 @@ def _strike(whole: Array, held: Array) -> Array:
     return whole * (1.0 - held[:, None] * held) + kept
 
 
-def from_prior(share: Array, law: Law) -> tuple[str, ...]:
+def from_prior(share: Unknowns, law: Law) -> tuple[str, ...]:
     """The names of the robot's parameters that come mostly from the prior."""
     robot = ("rate", "gain", "dead", "coupling", "wheel")
     shares = zip(names(law), share, strict=True)

@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxident.array_types import Array, Pose, Wheels
+from jaxident.array_types import Array, Pose, Rows, Wheels
 from jaxident.log import Log
 
 SAME_STEP = 1e-6
@@ -90,7 +90,7 @@ def run_axes(runs: Runs) -> Runs:
     return Runs(None if jnp.ndim(runs.step) == 0 else 0, 0, 0, 0, 0, 0)  # type: ignore[arg-type]
 
 
-def row_times(run: Runs) -> Array:
+def row_times(run: Runs) -> Rows:
     """Time [s] of each row (rows,) of one run since its first."""
     rows = run.seen.shape[-1]
     if jnp.ndim(run.step) == 0:

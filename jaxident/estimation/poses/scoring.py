@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxident.array_types import Array
+from jaxident.array_types import Array, Column, RunStates, Square, Unknowns, UnknownsMatrix
 from jaxident.estimation.poses.likelihood import deviation_steps, innovations
 from jaxident.estimation.poses.parameters import Law, bounds, is_logarithmic, names
 from jaxident.estimation.poses.prior import Prior, prior_terms
@@ -89,7 +89,7 @@ def local_at(point: Point, runs: Runs, law: Law) -> Local:
     )
 
 
-def _general_local(unknowns: Array, run: Runs, law: Law) -> tuple[Array, Array, Array]:
+def _general_local(unknowns: Column, run: Runs, law: Law) -> tuple[Array, Column, Square]:
     """Value, gradient and curvature of one run in its shared and own unknowns (n,)."""
 
     def both(unknowns):
@@ -103,7 +103,7 @@ def _general_local(unknowns: Array, run: Runs, law: Law) -> tuple[Array, Array, 
     return 0.5 * jnp.sum(z**2 + log_variance), gradient, error.T @ error + 0.5 * dlog.T @ dlog
 
 
-def _white_local(unknowns: Array, run: Runs, law: Law) -> tuple[Array, Array, Array]:
+def _white_local(unknowns: Column, run: Runs, law: Law) -> tuple[Array, Column, Square]:
     """The same where the camera error is white and nothing slips: both deviations enter in closed form."""
     first = names(law).index("position")
     deviations = unknowns[first : first + 2]
@@ -138,7 +138,7 @@ def rescale(point: Point, runs: Runs, law: Law) -> Point:
     return point._replace(shared=jnp.clip(point.shared + deviation_steps(found, runs, law), low, high))
 
 
-def eliminate(local: Local, damping: Damping, held: Array) -> tuple[Array, Array, Array]:
+def eliminate(local: Local, damping: Damping, held: Array) -> tuple[UnknownsMatrix, Unknowns, Array]:
     """The curvature of the shared unknowns with the start states eliminated, its gradient, and the elimination
     (runs, 5, unknowns + 1); `held` unknowns (unknowns,) stay where they are."""
     free = jnp.where(held, 0.0, 1.0)
@@ -155,7 +155,7 @@ def eliminate(local: Local, damping: Damping, held: Array) -> tuple[Array, Array
     return shared - reduced[:, :-1], free * local.gradient.shared - reduced[:, -1], solved
 
 
-def newton(local: Local, damping: Damping, held: Array) -> tuple[Array, Array, Array]:
+def newton(local: Local, damping: Damping, held: Array) -> tuple[Unknowns, RunStates, Array]:
     """The step in the shared unknowns and the start states with some unknowns held, and the fall it promises."""
     shared, gradient, solved = eliminate(local, damping, held)
     step = -jnp.linalg.solve(shared, gradient)
@@ -164,7 +164,7 @@ def newton(local: Local, damping: Damping, held: Array) -> tuple[Array, Array, A
     return step, starts, promised
 
 
-def along_steady_speeds(shared: Array, step: Array) -> Array:
+def along_steady_speeds(shared: Unknowns, step: Unknowns) -> Unknowns:
     """A vector (unknowns,) moved by a step. Gains move so that steady speeds, gain over rate, move in a straight line:
     poses tell these best, and a rate that hardly matters would otherwise drag them along."""
     faster = jnp.repeat(step[:2], 2)
@@ -211,7 +211,7 @@ def adapt(search: Search, better: Array) -> Search:
     return search._replace(damping=Damping(jnp.maximum(dead_zones, others), others), failures=failures)
 
 
-def with_prior(local: Local, shared: Array, law: Law, prior: Prior, sign: float = 1.0) -> Local:
+def with_prior(local: Local, shared: Unknowns, law: Law, prior: Prior, sign: float = 1.0) -> Local:
     """A prior's terms added, or with sign -1 taken away again."""
     value, gradient, curvature = prior_terms(shared, law, prior)
     slope = local.gradient._replace(shared=local.gradient.shared + sign * gradient)

@@ -8,7 +8,7 @@ start state of a run, both sensors then err independently of each other, and the
 import jax
 import jax.numpy as jnp
 
-from jaxident.array_types import Array, State
+from jaxident.array_types import Array, RunStates, State
 from jaxident.estimation.poses.parameters import Robot
 from jaxident.estimation.poses.prior import WHEEL
 from jaxident.estimation.poses.runs import Runs, run_axes
@@ -32,7 +32,7 @@ def wheel_residuals(robot: Robot, states: State, run: Runs) -> tuple[Array, Arra
     return jnp.where(seen, error, 0.0), jnp.where(seen, log_variance, 0.0)
 
 
-def first_sensor(robot: Robot, starts: Array, runs: Runs) -> WheelSensor:
+def first_sensor(robot: Robot, starts: RunStates, runs: Runs) -> WheelSensor:
     """A first estimate of the sensor from a first estimate of the robot, with start states (runs, 5): the regressions
     of the mean wheel speed on v, and of half the difference on w."""
 

@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxident.array_types import Array
+from jaxident.array_types import Array, PoseVector, RunFlags, RunPoses
 
 SHORTEST = 5
 LONGEST_SHARE = 0.1
@@ -28,7 +28,7 @@ def block_length(normalised: np.ndarray, seen: np.ndarray) -> int:
     return max(1, round(min(max(best, SHORTEST), LONGEST_SHARE * rows)))
 
 
-def draw_blocks(key: Array, normalised: Array, seen: Array, block: Array) -> Array:
+def draw_blocks(key: Array, normalised: RunPoses, seen: RunFlags, block: Array) -> RunPoses:
     """Innovations (runs, 3, rows) of blocks drawn from all runs (Kuensch 1989), one after the other on the rows that
     have a pose, the three channels together; 0 elsewhere. Centred."""
     pool, fits = _pool(normalised, seen, block)
@@ -38,7 +38,7 @@ def draw_blocks(key: Array, normalised: Array, seen: Array, block: Array) -> Arr
     return jnp.moveaxis(jnp.where(seen, pool[:, own], 0.0), 0, 1)
 
 
-def long_run_variance(normalised: Array, seen: Array, block: Array) -> Array:
+def long_run_variance(normalised: RunPoses, seen: RunFlags, block: Array) -> PoseVector:
     """Mean square of a block's sum over its rows, (3,): the variance that counts where errors are averaged."""
     pool, fits = _pool(normalised, seen, block)
     sums = jnp.concatenate([jnp.zeros((3, 1)), jnp.cumsum(pool, axis=1)], axis=1)
@@ -47,7 +47,7 @@ def long_run_variance(normalised: Array, seen: Array, block: Array) -> Array:
     return jnp.sum(fits * moved**2, axis=1) / block
 
 
-def _pool(normalised: Array, seen: Array, block: Array) -> tuple[Array, Array]:
+def _pool(normalised: RunPoses, seen: RunFlags, block: Array) -> tuple[Array, Array]:
     """Centred innovations (3, runs * rows) of all runs, those of poses first and 0 behind; and how probable each place
     is as a block's beginning, (runs * rows,)."""
     flat, mask = jnp.moveaxis(normalised, 1, 0).reshape(3, -1), seen.ravel()

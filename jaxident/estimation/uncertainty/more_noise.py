@@ -6,11 +6,11 @@ variance of the noise: as much noise again moves the estimate as far again (simu
 1994, J. Am. Stat. Assoc. 89, 1314-1328).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
-from jaxident.array_types import Increment
+from jaxident.array_types import Array, Increment
 from jaxident.errors import InputError, WorkError
 from jaxident.log import Log
 
@@ -20,7 +20,7 @@ MOVED = 3.0
 """Standard deviations beyond which a move is no chance."""
 
 
-def camera_error(residuals: Increment, alpha: Sequence[float]) -> tuple[float, float]:
+def camera_error(residuals: Increment, alpha: Array) -> tuple[float, float]:
     """Standard deviations [m], [rad] of white camera error that alone would leave such one-step residuals (samples,):
 
     var = sigma^2 (1 + (1 + alpha)^2 + alpha^2)."""

@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxident.array_types import AT_REST, Array, State
+from jaxident.array_types import AT_REST, Array, DifferenceMatrix, State, StateVector, Unknowns, UnknownsMatrix
 from jaxident.errors import InputError
 from jaxident.estimation.poses.covariance import covariance_at
 from jaxident.estimation.poses.parameters import Law, Robot, from_vector, names, to_vector
@@ -105,7 +105,7 @@ def law_of(drive: Physical, noise: Noise, wheels: bool = False) -> Law:
 
 
 @partial(jax.jit, static_argnames="law")
-def bound_covariance(vector: Array, start: Array, runs: Runs, law: Law) -> Array:
+def bound_covariance(vector: Unknowns, start: StateVector, runs: Runs, law: Law) -> UnknownsMatrix:
     """Covariance (unknowns, unknowns) by the information of runs (runs, rows), all from one start state (5,): pure,
     maps over trials. What they measured is not read."""
     robot = from_vector(vector, law)
@@ -123,7 +123,7 @@ def bound_covariance(vector: Array, start: Array, runs: Runs, law: Law) -> Array
     return covariance_at(point, local_at(point, exact, law), law)
 
 
-def natural_values(robot: Robot, law: Law) -> Array:
+def natural_values(robot: Robot, law: Law) -> Unknowns:
     """The unknowns (unknowns,) of a robot in natural units, in the order of `names(law)`."""
     parts = [*robot.drive.rate, *(g for row in robot.drive.gain for g in row), *robot.dead_zone]
     parts += list(robot.drive.coupling) if law.coupling else []
@@ -135,7 +135,7 @@ def natural_values(robot: Robot, law: Law) -> Array:
     return jnp.stack([jnp.asarray(part) for part in parts])
 
 
-def difference_covariance(vector: Array, covariance: Array, period: Array, law: Law) -> Array:
+def difference_covariance(vector: Unknowns, covariance: UnknownsMatrix, period: Array, law: Law) -> DifferenceMatrix:
     """Covariance (12, 12) in DIFFERENCE_ORDER of the hold image at a period [s], carried to first order; the coupling
     is neglected as in the image itself."""
 
@@ -147,7 +147,7 @@ def difference_covariance(vector: Array, covariance: Array, period: Array, law: 
     return slope @ covariance[:8, :8] @ slope.T
 
 
-def spread_of(covariance: Array, difference: Array, law: Law) -> Spread:
+def spread_of(covariance: UnknownsMatrix, difference: DifferenceMatrix, law: Law) -> Spread:
     """Standard deviations in the shape of a model's parameters, from both covariances."""
     deviation = dict(zip(names(law), np.sqrt(np.diagonal(np.asarray(covariance))), strict=True))
     image = np.sqrt(np.diagonal(np.asarray(difference)))

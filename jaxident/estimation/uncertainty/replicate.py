@@ -3,7 +3,7 @@
 import jax
 import jax.numpy as jnp
 
-from jaxident.array_types import Array, Pose, State
+from jaxident.array_types import Array, Pose, PoseMatrix, PoseRows, PoseVector, State, StateVector
 from jaxident.estimation.poses.filter import Belief, first_belief, predict_belief, step_weights, take_in
 from jaxident.estimation.poses.parameters import Robot
 from jaxident.estimation.poses.runs import Runs
@@ -12,7 +12,7 @@ from jaxident.robot.drive import force, hold
 from jaxident.robot.noise import Noise
 
 
-def replicate_run(robot: Robot, start: Array, run: Runs, normalised: Array) -> Pose:
+def replicate_run(robot: Robot, start: StateVector, run: Runs, normalised: PoseRows) -> Pose:
     """Poses (rows,) of a run (rows,) from its start state (5,) and normalised innovations (3, rows).
 
     The inverse of `likelihood.innovations`: the innovation form of the filter run forwards (Stoffer and Wall 1991),
@@ -40,7 +40,7 @@ def replicate_run(robot: Robot, start: Array, run: Runs, normalised: Array) -> P
     return Pose(*jnp.concatenate([poses, last[None]]).T)
 
 
-def _pose(belief: Belief, z: Array, noise: Noise) -> Array:
+def _pose(belief: Belief, z: PoseVector, noise: Noise) -> PoseVector:
     """The pose (3,) whose innovation, over its standard deviations coordinate by coordinate, is z (3,)."""
     mean, covariance = belief.mean[:3], belief.covariance[:3, :3]
     if noise.correlation_time is None:
@@ -51,7 +51,7 @@ def _pose(belief: Belief, z: Array, noise: Noise) -> Array:
     return mean + _lower(covariance) @ z
 
 
-def _lower(matrix: Array) -> Array:
+def _lower(matrix: PoseMatrix) -> PoseMatrix:
     """The Cholesky factor of a positive definite matrix (3, 3) in plain arithmetic, which maps over trials."""
     columns = []
     for k in range(3):
