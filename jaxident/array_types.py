@@ -21,8 +21,8 @@ from jaxtyping import Bool, Float
 Array = Any
 """A JAX array, or what JAX takes in its place: a NumPy array, a number. Docstrings say the shape."""
 
-# Arrays by their axes. Two arguments of one call that name an axis agree in its length. Nothing is checked when the
-# program runs; `JAXIDENT_CHECK_SHAPES=1 python -m pytest` checks calls (`tests/conftest.py`).
+# Arrays by their axes. Within one call, axes of the same name have the same length. The program does not check this;
+# `JAXIDENT_CHECK_SHAPES=1 python -m pytest` does, for the packages that `tests/conftest.py` names.
 Samples = Float[Array, "samples"]  # one number per row of a log
 SampleFlags = Bool[Array, "samples"]
 Signals = Float[Array, "n samples"]

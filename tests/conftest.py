@@ -36,7 +36,7 @@ QUICK = (
     "report/test_diagnosis.py",
     "cli/test_export.py",
 )
-"""Test files of the quick tier, at least one for each room, one whole diagnosis among them."""
+"""Test files of the quick tier, at least one for each folder of the package, one whole diagnosis among them."""
 
 MAPS = pathlib.Path("/proc/self/maps")
 MANY = 20_000
@@ -47,6 +47,7 @@ maps the tests of one process were nine tenths through; beyond the limit the pro
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Gives the tests of the QUICK files the marker `quick`, apart from slow ones."""
     files = {pathlib.Path(__file__).parent / name for name in QUICK}
+    assert all(file.is_file() for file in files), "QUICK names a file that is not there"
     for item in items:
         if item.path in files and not item.get_closest_marker("slow"):
             item.add_marker("quick")
