@@ -11,9 +11,9 @@ from jaxident.array_types import Array, Pose
 from jaxident.errors import InputError, WorkError
 from jaxident.estimation.poses.maximum_likelihood import Fit, uncertain_as_by
 from jaxident.estimation.poses.noise_law import WHITE, colour, fit_law
-from jaxident.estimation.poses.parameters import Law, names, to_vector
+from jaxident.estimation.poses.parameters import Law, Robot, names, to_vector
 from jaxident.estimation.poses.prior import RATE, from_prior
-from jaxident.estimation.poses.runs import Runs, stack_runs, with_wheels
+from jaxident.estimation.poses.runs import Runs, pad_rows, stack_runs, with_wheels
 from jaxident.estimation.poses.wheel_colour import WHITE_WHEELS, spacing, thinned, wheel_colour
 from jaxident.estimation.suspicions.log_suspicions import log_suspicions, odometry_suspicions
 from jaxident.estimation.uncertainty.precision import difference_covariance, spread_of
@@ -50,9 +50,10 @@ def identify_poses(log: Log, d_max: float, noise_law: str, coupling: bool) -> Po
         raise InputError(f"{len(log.t)} rows, {measured} with a pose: maximum likelihood needs at least {SMALLEST_LOG}")
     log = _with_commands(log)
     runs = stack_runs(log)
-    if log.wheel_r is not None:
-        runs = with_wheels(runs, log)
-    fit, law, doubts = _fitted(runs, d_max, noise_law, coupling)
+    runs = runs if log.wheel_r is None else with_wheels(runs, log)
+    fit, law, doubts = _fitted(pad_rows(runs), d_max, noise_law, coupling)
+    rows = runs.seen.shape[1]
+    fit = fit._replace(innovations=jax.tree.map(lambda part: part[..., :rows], fit.innovations))
     if not all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves((fit.robot, fit.covariance))):
         raise WorkError("the maximum-likelihood estimate is not finite: the log does not determine the model")
     doubts = (*_suspicions(fit, law, runs, noise_law), *doubts, *log_suspicions(log))
@@ -94,7 +95,7 @@ def _steps(log: Log) -> np.ndarray:
 
 def _model(fit: Fit, law: Law, period: float) -> Model:
     """The estimate as a model with its noise law, covariance and standard deviations."""
-    difference = _difference_covariance(fit, period, law)
+    difference = _difference_covariance(fit.robot, fit.covariance, period, law)
     noise = fit.robot.noise
     return Model(
         period,
@@ -110,8 +111,8 @@ def _model(fit: Fit, law: Law, period: float) -> Model:
 
 
 @partial(jax.jit, static_argnames="law")
-def _difference_covariance(fit: Fit, period: Array, law: Law) -> Array:
-    return difference_covariance(to_vector(fit.robot, law), fit.covariance, period, law)
+def _difference_covariance(robot: Robot, covariance: Array, period: Array, law: Law) -> Array:
+    return difference_covariance(to_vector(robot, law), covariance, period, law)
 
 
 def _suspicions(fit: Fit, law: Law, runs: Runs, noise_law: str) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from jaxident.estimation.poses.covariance import posterior_at
 from jaxident.estimation.poses.likelihood import Innovations, innovations
 from jaxident.estimation.poses.parameters import Law, Robot, from_vector, to_vector
 from jaxident.estimation.poses.prior import Prior, prior_of
-from jaxident.estimation.poses.runs import Runs, cut_windows, run_axes
+from jaxident.estimation.poses.runs import WINDOW, Runs, cut_windows, run_axes
 from jaxident.estimation.poses.scoring import Point, Search, local_at, search_from, with_prior
 from jaxident.estimation.poses.starter import Start, channels, first_estimate, start_states
 from jaxident.estimation.poses.wheel_likelihood import first_sensor
@@ -19,8 +19,6 @@ from jaxident.numerics import in_blocks
 from jaxident.robot.drive import Physical
 from jaxident.robot.noise import Noise
 
-WINDOW = 200
-"""Rows of the windows that the starter fits: long enough for a slow pole, too short for slip to pile up."""
 MOST_STEPS = 100
 BLOCK = 4
 """Trials of a batch whose starters run at once: the paths of more leave the second-level cache."""

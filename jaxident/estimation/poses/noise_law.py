@@ -96,7 +96,8 @@ def coasts(fit: Fit, runs: Runs) -> np.ndarray:
     run, and either under residuals that are coloured or by gains whose signs are not clearly a differential drive's."""
     rate, gain = np.array(fit.robot.drive.rate, float), np.array(fit.robot.drive.gain, float)
     deviation = np.sqrt(np.diagonal(np.asarray(fit.covariance))[2:6]).reshape(2, 2)
-    longest = float(np.max(np.sum(np.broadcast_to(np.asarray(runs.step), runs.seen.shape), axis=1)))
+    time = np.cumsum(np.broadcast_to(np.asarray(runs.step), runs.seen.shape), axis=1)
+    longest = float(np.max(np.where(np.asarray(runs.seen), time, 0.0)))
     slow = (rate < RATE * np.exp(-NORMAL_HALF * RATE_SPREAD)) & (rate * longest < 1.0)
     driven = np.all(np.array(SIGNS) * gain > CLEAR * deviation, axis=1)
     return slow & (~driven | (colour(fit, runs) >= WHITE))

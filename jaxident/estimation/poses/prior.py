@@ -19,7 +19,7 @@ import jax.numpy as jnp
 
 from jaxident.array_types import Array, Column, Gains, Rows, Square, Unknowns, UnknownsMatrix
 from jaxident.estimation.poses.parameters import Law, is_logarithmic, names
-from jaxident.estimation.poses.runs import Runs, row_times
+from jaxident.estimation.poses.runs import Runs, row_times, rows_used
 from jaxident.numerics import safe_divide, sin_cos, wrap
 
 RATE, RATE_SPREAD = 3.0, 1.175
@@ -71,13 +71,15 @@ def no_prior() -> Prior:
 
 def speeds(runs: Runs) -> tuple[Array, Array]:
     """Root-mean-square speed along [m/s] and in heading [rad/s] of runs (runs, rows), from poses some rows apart."""
-    lag = max(1, min(LONGEST_LAG, runs.seen.shape[1] // LAG_SHARE))
+    lag = jnp.clip(rows_used(runs) // LAG_SHARE, 1, LONGEST_LAG)
+    rows = jnp.arange(runs.seen.shape[1])
+    before, usable = jnp.maximum(rows - lag, 0), runs.seen & (rows >= lag)
     step = jnp.broadcast_to(runs.step, runs.seen.shape)
     path, heading, time = jax.vmap(_travelled)(runs._replace(step=step))
-    passed, usable = time[:, lag:] - time[:, :-lag], runs.seen[:, lag:]
+    passed = time - time[:, before]
 
     def size(way: Array) -> Array:
-        squares = safe_divide(way[:, lag:] - way[:, :-lag], passed, 0.0) ** 2
+        squares = safe_divide(way - way[:, before], passed, 0.0) ** 2
         mean = jnp.sum(jnp.where(usable, squares, 0.0)) / jnp.maximum(jnp.sum(usable), 1)
         return jnp.sqrt(jnp.maximum(mean, 1e-24))
 

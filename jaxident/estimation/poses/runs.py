@@ -9,6 +9,10 @@ import numpy as np
 from jaxident.array_types import Array, Pose, Rows, Wheels
 from jaxident.log import Log
 
+WINDOW = 200
+"""Rows of the windows that the starter fits: long enough for a slow pole, too short for slip to pile up."""
+EIGHTH = 3
+"""Binary digits after the first one that lengths of long runs keep: padding adds an eighth at most."""
 SAME_STEP = 1e-6
 """Steps that differ by less than this, relative to their mean, are one step: sums of a binary fraction."""
 
@@ -65,6 +69,31 @@ def with_wheels(runs: Runs, log: Log) -> Runs:
             turning[side][k, : len(run.t)] = measured
             wheels[side][k, : len(run.t)] = np.where(measured, speed, 0.0)
     return runs._replace(wheels=wheels, turning=turning)
+
+
+def pad_rows(runs: Runs) -> Runs:
+    """The runs (NumPy arrays) with rows that nothing was measured in behind them, up to whole windows or, of many, to
+    the next eighth of a power of two of them. Programs are compiled for a shape: so one serves logs of many lengths."""
+    rows = runs.seen.shape[1]
+    windows = -(-rows // WINDOW)
+    grain = WINDOW << max(0, windows.bit_length() - 1 - EIGHTH)
+    more = -rows % grain
+
+    def padded(column: Array) -> np.ndarray:
+        if np.ndim(column) == 0:
+            return np.asarray(column)
+        return np.pad(column, ((0, 0), (0, more)))
+
+    step = padded(runs.step)
+    if np.ndim(step):
+        step[:, rows:] = np.mean(runs.step)
+    return jax.tree.map(padded, runs)._replace(step=step)
+
+
+def rows_used(runs: Runs) -> Array:
+    """How many rows from the first on the longest of runs (runs, rows) has, up to its last pose."""
+    rows = 1 + jnp.arange(runs.seen.shape[1])
+    return jnp.max(jnp.where(runs.seen, rows, 1))
 
 
 def cut_windows(runs: Runs, rows: int) -> Runs:

@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array
-from jaxident.estimation.poses.runs import Runs
+from jaxident.estimation.poses.runs import Runs, rows_used
 from jaxident.numerics import hold_integrals, safe_divide, sin_cos
 from jaxident.robot.dead_zone import dead_zone
 
@@ -61,7 +61,7 @@ def first_estimate(pair: tuple[Channel, Channel], windows: Runs, d_max: Array) -
     The first grid's best points, as many as FOLLOWED says, each lead to finer ones around them; if they are several,
     MORE grids follow around the best of all.
     """
-    rows, step = windows.seen.shape[1], jnp.mean(windows.step)
+    rows, step = rows_used(windows), jnp.mean(windows.step)
     counts = jnp.stack([jnp.sum(c.weight) * c.measured.shape[1] for c in pair])
     first = jnp.geomspace(SLOWEST / (rows * step), FASTEST / step, RATES)
     spread = (first[1] / first[0]) ** jnp.linspace(-1.0, 1.0, RATES)

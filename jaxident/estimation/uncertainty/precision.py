@@ -12,7 +12,7 @@ from jaxident.array_types import AT_REST, Array, DifferenceMatrix, State, StateV
 from jaxident.errors import InputError
 from jaxident.estimation.poses.covariance import covariance_at
 from jaxident.estimation.poses.parameters import Law, Robot, from_vector, names, to_vector
-from jaxident.estimation.poses.runs import Runs, run_axes, stack_runs, with_wheels
+from jaxident.estimation.poses.runs import Runs, pad_rows, run_axes, stack_runs, with_wheels
 from jaxident.estimation.poses.scoring import Point, local_at
 from jaxident.estimation.uncertainty.verdict import Verdict, verdicts_of
 from jaxident.log import Log, join
@@ -70,7 +70,7 @@ def cramer_rao(model: Model, inputs: Log | Sequence[Log], noise: Noise, *, start
     runs = _with_planned_wheels(model, runs, log)
     law = law_of(drive, noise, wheels=runs.wheels is not None)
     vector = to_vector(Robot(drive, model.dead_zone, noise, model.wheels), law)
-    covariance = bound_covariance(vector, jnp.stack([jnp.asarray(s, float) for s in start]), runs, law)
+    covariance = bound_covariance(vector, jnp.stack([jnp.asarray(s, float) for s in start]), pad_rows(runs), law)
     difference = difference_covariance(vector, covariance, model.sample_period, law)
     largest = max(float(np.max(np.abs(u))) for u in runs.command)
     values = natural_values(from_vector(vector, law), law)
