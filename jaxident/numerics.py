@@ -107,16 +107,10 @@ def hold_integrals(rate: Array, time: Array) -> tuple[Array, Array, Array]:
     z = -rate * time
     small = jnp.abs(z) < _SERIES_BELOW
     z_series, z_closed = jnp.where(small, z, 0.0), jnp.where(small, 1.0, z)
-    first = jnp.where(
-        small,
-        _polynomial(z_series, [1.0 / math.factorial(k + 1) for k in range(_SERIES_TERMS)]),
-        jnp.expm1(z_closed) / z_closed,
-    )
-    second = jnp.where(
-        small,
-        _polynomial(z_series, [1.0 / math.factorial(k + 2) for k in range(_SERIES_TERMS)]),
-        (first - 1.0) / z_closed,
-    )
+    closed = jnp.expm1(z_closed) / z_closed
+    series = _polynomial(z_series, [1.0 / math.factorial(k + 2) for k in range(_SERIES_TERMS)])
+    first = jnp.where(small, 1.0 + z_series * series, closed)
+    second = jnp.where(small, series, (closed - 1.0) / z_closed)
     return jnp.exp(z), time * first, time * time * second
 
 

@@ -22,12 +22,13 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.errors import InputError, WorkError
 from jaxident.estimation.identify import D_MAX_SHARE, Identification
+from jaxident.estimation.poses.curvature import Point
 from jaxident.estimation.poses.likelihood import innovations
 from jaxident.estimation.poses.maximum_likelihood import MOST_STEPS
 from jaxident.estimation.poses.parameters import Law, Robot, from_vector, names, to_vector
 from jaxident.estimation.poses.prior import Prior
 from jaxident.estimation.poses.runs import Runs, run_axes, stack_runs, with_wheels
-from jaxident.estimation.poses.scoring import Point, search_from
+from jaxident.estimation.poses.scoring import search_from
 from jaxident.estimation.uncertainty.blocks import block_length, draw_blocks, long_run_variance
 from jaxident.estimation.uncertainty.precision import law_of, natural_values
 from jaxident.estimation.uncertainty.replicate import replicate_run

@@ -3,9 +3,10 @@
 import jax.numpy as jnp
 
 from jaxident.array_types import Unknowns, UnknownsMatrix
+from jaxident.estimation.poses.curvature import Local, Point
 from jaxident.estimation.poses.parameters import Law, is_logarithmic, names
 from jaxident.estimation.poses.prior import FLAT, Prior, posterior
-from jaxident.estimation.poses.scoring import Damping, Local, Point, eliminate, with_prior
+from jaxident.estimation.poses.scoring import Damping, eliminate, with_prior
 
 
 def data_curvature(local: Local, law: Law) -> UnknownsMatrix:

@@ -13,7 +13,7 @@ import jax.numpy as jnp
 
 from jaxident.array_types import Array, Pose, State, StateVector, Unknowns, Wheels
 from jaxident.estimation.poses.filter import filter_run
-from jaxident.estimation.poses.parameters import Law, from_vector, names
+from jaxident.estimation.poses.parameters import Law, from_vector
 from jaxident.estimation.poses.runs import Runs, row_times
 from jaxident.estimation.poses.wheel_likelihood import wheel_residuals
 from jaxident.numerics import wrap
@@ -30,12 +30,6 @@ class Innovations(NamedTuple):
     log_variance: Any
     turning: Any = None
     turning_log_variance: Any = None
-
-    def flat(self, *tail: int) -> list[Any]:
-        """All innovations and all log variances, one after the other, (numbers, *tail); slopes have a tail."""
-        pairs = (self.normalised, self.turning), (self.log_variance, self.turning_log_variance)
-        kept = [[part.reshape(-1, *tail) for part in pair if part is not None] for pair in pairs]
-        return [parts[0] if len(parts) == 1 else jnp.concatenate(parts) for parts in kept]
 
 
 def innovations(vector: Unknowns, start: StateVector, run: Runs, law: Law) -> Innovations:
@@ -61,22 +55,6 @@ def innovations(vector: Unknowns, start: StateVector, run: Runs, law: Law) -> In
 def pose_error(measured: Pose, pose: Pose) -> Array:
     """Measured minus modelled pose (3, ...) [m, m, rad], the heading wrapped."""
     return jnp.stack([measured.x - pose.x, measured.y - pose.y, wrap(measured.theta - pose.theta)])
-
-
-def deviation_steps(found: Innovations, runs: Runs, law: Law) -> Unknowns:
-    """What to add to a vector (unknowns,) so that the deviations of white errors stand at their optimum, all else as it
-    is: in closed form from the innovations of all runs (runs, 3, rows). The camera's have none with slip."""
-    step = jnp.zeros(len(names(law)))
-    if not law.slip:
-        squares = jnp.sum(found.normalised**2, axis=(0, 2))
-        count = jnp.maximum(jnp.sum(runs.seen), 1)
-        mean = jnp.stack([0.5 * (squares[0] + squares[1]), squares[2]]) / count
-        first = names(law).index("position")
-        step = step.at[first : first + 2].set(0.5 * jnp.log(jnp.maximum(mean, 1e-30)))
-    if law.wheels:
-        mean = jnp.sum(found.turning**2) / jnp.maximum(jnp.sum(jnp.stack(runs.turning)), 1)
-        step = step.at[names(law).index("wheel_noise")].set(0.5 * jnp.log(jnp.maximum(mean, 1e-30)))
-    return step
 
 
 def negative_log_likelihood(found: Innovations) -> Array:

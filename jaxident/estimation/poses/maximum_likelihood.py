@@ -8,11 +8,12 @@ import jax.numpy as jnp
 
 from jaxident.array_types import Array
 from jaxident.estimation.poses.covariance import posterior_at
+from jaxident.estimation.poses.curvature import Point, local_at
 from jaxident.estimation.poses.likelihood import Innovations, innovations
 from jaxident.estimation.poses.parameters import Law, Robot, from_vector, to_vector
 from jaxident.estimation.poses.prior import Prior, prior_of
 from jaxident.estimation.poses.runs import WINDOW, Runs, cut_windows, run_axes
-from jaxident.estimation.poses.scoring import Point, Search, local_at, search_from, with_prior
+from jaxident.estimation.poses.scoring import Search, search_from, with_prior
 from jaxident.estimation.poses.starter import Start, channels, first_estimate, start_states
 from jaxident.estimation.poses.wheel_likelihood import first_sensor
 from jaxident.numerics import in_blocks

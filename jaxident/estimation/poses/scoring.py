@@ -1,9 +1,7 @@
 """Fisher scoring with Levenberg-Marquardt damping for unknowns shared by all runs and start states of each run.
 
-With z and log s of `likelihood`, gradient and expected curvature of -log p are sums over samples of
-    z dz + dlog s / 2        and        E' E + dlog s' dlog s / 2,   E = dz + z dlog s / 2
-(E is the derivative of the innovation over sqrt(s)). Start states touch their own run alone: they are eliminated run by
-run (Schur complement), so that the cost grows linearly with runs. optimistix has no solver for either structure.
+Start states touch their own run alone: they are eliminated run by run (Schur complement), so that the cost grows
+linearly with runs. optimistix has no solver for this structure, nor for the curvature of `curvature`.
 """
 
 from typing import Any, NamedTuple
@@ -11,13 +9,12 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxident.array_types import Array, Column, RunStates, Square, Unknowns, UnknownsMatrix
-from jaxident.estimation.poses.likelihood import deviation_steps, innovations
+from jaxident.array_types import Array, RunStates, Unknowns, UnknownsMatrix
+from jaxident.estimation.poses.curvature import START_STATES, Local, Point, local_at_best_deviations
 from jaxident.estimation.poses.parameters import Law, bounds, is_logarithmic, names
 from jaxident.estimation.poses.prior import Prior, prior_terms
-from jaxident.estimation.poses.runs import Runs, run_axes
+from jaxident.estimation.poses.runs import Runs
 
-START_STATES = 5
 FIRST_DAMPING, EASE, STIFFEN, LEAST_DAMPING, LARGEST_DAMPING = 1e-3, 0.03, 10.0, 1e-12, 1e12
 """The least lies far below the flattest direction of a long run: 1e-6 and 0.1 take 27 steps over 32,000 rows, not 8."""
 TOLERANCE = 1e-7
@@ -27,24 +24,6 @@ KINK_STEP, KINK_TOLERANCE = 1e-2, 1e-4
 DEAD_ZONES = slice(6, 8)
 LONGEST_LOG_STEP, LONGEST_SHARE = 1.5, 0.25
 """A step changes a logarithm by at most this much, and a dead zone by this share of its bound."""
-
-
-class Point(NamedTuple):
-    """Unknowns: shared vector (unknowns,), start states (runs, 5)."""
-
-    shared: Any
-    starts: Any
-
-
-class Local(NamedTuple):
-    """-log p at a point, its gradient in both parts, and expected curvature: shared (unknowns, unknowns), of each start
-    (runs, 5, 5), and between them (runs, unknowns, 5)."""
-
-    value: Any
-    gradient: Point
-    shared: Any
-    starts: Any
-    between: Any
 
 
 class Damping(NamedTuple):
@@ -70,72 +49,6 @@ class Search(NamedTuple):
     failures: Any
     steps: Any
     arrived: Any
-
-
-def local_at(point: Point, runs: Runs, law: Law) -> Local:
-    """Value, gradient and expected curvature at a point, by forward-mode derivatives through the simulator."""
-
-    of_run = _general_local if law.memory or law.slip or law.wheels else _white_local
-    cut = len(names(law))
-    unknowns = jnp.concatenate([jnp.tile(point.shared, (len(point.starts), 1)), point.starts], axis=1)
-    over = jax.vmap(lambda own, run: of_run(own, run, law), in_axes=(0, run_axes(runs)))
-    value, gradient, curvature = over(unknowns, runs)
-    return Local(
-        jnp.sum(value),
-        Point(jnp.sum(gradient[:, :cut], axis=0), gradient[:, cut:]),
-        jnp.sum(curvature[:, :cut, :cut], axis=0),
-        curvature[:, cut:, cut:],
-        curvature[:, :cut, cut:],
-    )
-
-
-def _general_local(unknowns: Column, run: Runs, law: Law) -> tuple[Array, Column, Square]:
-    """Value, gradient and curvature of one run in its shared and own unknowns (n,)."""
-
-    def both(unknowns):
-        found = innovations(unknowns[:-START_STATES], unknowns[-START_STATES:], run, law)
-        return found, found
-
-    slopes, found = jax.jacfwd(both, has_aux=True)(unknowns)
-    (dz, dlog), (z, log_variance) = slopes.flat(len(unknowns)), found.flat()
-    error = dz + 0.5 * z[:, None] * dlog
-    gradient = dz.T @ z + 0.5 * jnp.sum(dlog, axis=0)
-    return 0.5 * jnp.sum(z**2 + log_variance), gradient, error.T @ error + 0.5 * dlog.T @ dlog
-
-
-def _white_local(unknowns: Column, run: Runs, law: Law) -> tuple[Array, Column, Square]:
-    """The same where the camera error is white and nothing slips: both deviations enter in closed form."""
-    first = names(law).index("position")
-    deviations = unknowns[first : first + 2]
-    others = jnp.concatenate([unknowns[:first], unknowns[first + 2 :]])
-
-    def both(others):
-        shared = jnp.concatenate([others[:first], deviations])
-        found = innovations(shared, others[first:], run, law)
-        return found.normalised, found
-
-    slope, found = jax.jacfwd(both, has_aux=True)(others)
-    slope, z = slope.reshape(-1, len(others)), found.normalised
-    seen = jnp.sum(run.seen)
-    count, squares = jnp.stack([2 * seen, seen]), jnp.stack([jnp.sum(z[:2] ** 2), jnp.sum(z[2] ** 2)])
-    place = jnp.concatenate([jnp.arange(first), jnp.arange(first + 2, len(unknowns))])
-    curvature = jnp.zeros((len(unknowns),) * 2).at[place[:, None], place].set(slope.T @ slope)
-    gradient = jnp.zeros(len(unknowns)).at[place].set(slope.T @ z.ravel())
-    where = first + jnp.arange(2)
-    curvature = curvature.at[where, where].set(2.0 * count)
-    value = 0.5 * (jnp.sum(squares) + jnp.sum(found.log_variance))
-    return value, gradient.at[where].set(count - squares), curvature
-
-
-def rescale(point: Point, runs: Runs, law: Law) -> Point:
-    """The point with the deviations of white errors at their optimum for the rest, in closed form."""
-    if law.slip and not law.wheels:
-        return point
-    found = jax.vmap(lambda start, run: innovations(point.shared, start, run, law), in_axes=(0, run_axes(runs)))(
-        point.starts, runs
-    )
-    low, high = bounds(law, jnp.inf)
-    return point._replace(shared=jnp.clip(point.shared + deviation_steps(found, runs, law), low, high))
 
 
 def eliminate(local: Local, damping: Damping, held: Array) -> tuple[UnknownsMatrix, Unknowns, Array]:
@@ -224,8 +137,8 @@ def search_from(point: Point, runs: Runs, law: Law, d_max: Array, most: int, pri
     low, high = bounds(law, d_max)
 
     def body(search):
-        there = rescale(search.proposed, runs, law)
-        local = with_prior(local_at(there, runs, law), there.shared, law, prior)
+        there, local = local_at_best_deviations(search.proposed, runs, law)
+        local = with_prior(local, there.shared, law, prior)
         better = (local.value <= search.local.value) | (search.steps == 0)
         point, local = jax.tree.map(lambda a, b: jnp.where(better, a, b), (there, local), (search.point, search.local))
         after = adapt(search, better)._replace(point=point, local=local, steps=search.steps + 1)

@@ -11,9 +11,9 @@ import numpy as np
 from jaxident.array_types import AT_REST, Array, DifferenceMatrix, State, StateVector, Unknowns, UnknownsMatrix
 from jaxident.errors import InputError
 from jaxident.estimation.poses.covariance import covariance_at
+from jaxident.estimation.poses.curvature import Point, local_at
 from jaxident.estimation.poses.parameters import Law, Robot, from_vector, names, to_vector
 from jaxident.estimation.poses.runs import Runs, pad_rows, run_axes, stack_runs, with_wheels
-from jaxident.estimation.poses.scoring import Point, local_at
 from jaxident.estimation.uncertainty.verdict import Verdict, verdicts_of
 from jaxident.log import Log, join
 from jaxident.numerics import require_float64

@@ -1,7 +1,5 @@
 """Maximum likelihood: recovery, efficiency and coverage, several runs, gaps, uneven steps, batches, corners."""
 
-from functools import partial
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -12,12 +10,9 @@ from jaxident.array_types import AT_REST, Pose, Wheels
 from jaxident.errors import InputError
 from jaxident.estimation.identify import identify
 from jaxident.estimation.poses.maximum_likelihood import fit_runs
-from jaxident.estimation.poses.noise_law import NOISE_LAWS
-from jaxident.estimation.poses.parameters import Law, Robot, bounds, from_vector, names, to_vector
-from jaxident.estimation.poses.runs import Runs, stack_runs
-from jaxident.estimation.poses.scoring import Point, _general_local, _white_local, local_at
+from jaxident.estimation.poses.parameters import Law, Robot, from_vector, names, to_vector
+from jaxident.estimation.poses.runs import Runs
 from jaxident.estimation.uncertainty.precision import bound_covariance, natural_values
-from jaxident.log import make_log
 from jaxident.robot.excitation import EXCITATIONS
 from jaxident.robot.model import Model
 from jaxident.robot.noise import Noise, draw_noise, observe
@@ -194,20 +189,6 @@ def test_auto_finds_the_noise_law():
     assert white.model.noise.position == pytest.approx(1e-3, rel=0.15)
 
 
-@pytest.mark.parametrize("law", list(NOISE_LAWS.values()))
-def test_derivatives_are_finite_at_corners(law):
-    """At rest, on a dead zone's edge, at both ends of the bounds, and with no pose at all."""
-    log = make_log(PERIOD * np.arange(30), np.full(30, 0.25), np.full(30, -0.2), *np.zeros((3, 30)))
-    runs = jax.tree.map(jnp.asarray, stack_runs(log))
-    vector = to_vector(Robot(DRIVE, DEAD_ZONE, Noise(1e-3, 1e-2, 0.1, 0.01, 0.1)), law)
-    low, high = bounds(law, jnp.asarray(D_MAX))
-    local = jax.jit(lambda v, r: local_at(Point(v, jnp.zeros((1, 5))), r, law))
-    for point in (vector, jnp.where(jnp.isfinite(low), low, 0.0), jnp.where(jnp.isfinite(high), high, 0.0)):
-        for seen in (runs.seen, jnp.zeros_like(runs.seen)):
-            found = local(point, runs._replace(seen=seen))
-            assert all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves(found))
-
-
 def test_what_cannot_be_fitted_says_why():
     log = logged(5)
     still = log._replace(x=0.0 * log.x, y=0.0 * log.y, theta=0.0 * log.theta)
@@ -227,13 +208,3 @@ def test_vectors_come_back_as_the_robot():
     again = natural_values(from_vector(to_vector(robot, law), law), law)
     np.testing.assert_allclose(again, natural_values(robot, law), rtol=1e-12)
     assert len(again) == len(names(law)) == 15
-
-
-def test_white_shortcut_is_the_general_curvature():
-    runs = jax.tree.map(jnp.asarray, stack_runs(logged(6, Noise(1e-3, 1e-2), 60)))
-    run = jax.tree.map(lambda leaf: leaf[0] if jnp.ndim(leaf) else leaf, runs)
-    vector = to_vector(Robot(DRIVE, DEAD_ZONE, Noise(1e-3, 1e-2)), Law())
-    unknowns = jnp.concatenate([vector, 0.01 * jnp.ones(5)])
-    both = [jax.jit(partial(part, law=Law()))(unknowns, run) for part in (_white_local, _general_local)]
-    for a, b in zip(*both, strict=True):
-        np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9 * np.max(np.abs(b)))

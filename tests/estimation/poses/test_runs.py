@@ -1,0 +1,49 @@
+"""Runs as rectangles: padded rows change no estimate, and spare a compilation."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from support.diagonal_robot import DEAD_ZONE, DRIVE, PERIOD, logged
+
+from jaxident.estimation.identify import identify
+from jaxident.estimation.poses.curvature import Point, local_at_best_deviations
+from jaxident.estimation.poses.maximum_likelihood import begin, fit_from
+from jaxident.estimation.poses.parameters import Law, Robot, to_vector
+from jaxident.estimation.poses.prior import prior_of
+from jaxident.estimation.poses.runs import WINDOW, pad_rows, rows_used, stack_runs
+from jaxident.log import join
+from jaxident.robot.noise import Noise
+
+NOISE = Noise(1e-3, 1e-2)
+
+
+def test_padded_rows_change_nothing_that_a_fit_is_made_of():
+    """Beginning, prior and curvature of two runs, both shorter than a window, with steps of any length."""
+    runs = stack_runs(join([logged(1, NOISE, 90, 0.3), logged(2, NOISE, 150, 0.3)]))
+    law = Law(memory=True)
+    point = Point(to_vector(Robot(DRIVE, DEAD_ZONE, NOISE._replace(correlation_time=0.1)), law), jnp.zeros((2, 5)))
+    parts = jax.jit(lambda own: (begin(own, 0.9), prior_of(own), local_at_best_deviations(point, own, law)))
+    both = [parts(own) for own in (runs, pad_rows(runs))]
+    for a, b in zip(*map(jax.tree.leaves, both), strict=True):
+        np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9 * float(np.max(np.abs(b))))
+
+
+def test_logs_of_many_lengths_share_a_program():
+    compiled = None
+    for rows in (310, 395, 322):
+        found = identify(logged(3, NOISE, rows))
+        assert found.fit.innovations.normalised.shape == (1, 3, rows)
+        assert compiled in (None, fit_from._cache_size())
+        compiled = fit_from._cache_size()
+
+
+def test_padding_is_whole_windows_and_an_eighth_at_most():
+    for rows in (20, WINDOW, WINDOW + 1, 3000, 3400, 22_200, 1_000_003):
+        runs = stack_runs(logged(0, rows=20))
+        runs = jax.tree.map(lambda leaf, rows=rows: np.resize(leaf, (1, rows)) if np.ndim(leaf) else leaf, runs)
+        length = pad_rows(runs).seen.shape[1]
+        assert length % WINDOW == 0
+        assert rows <= length < max(rows + WINDOW, 1.125 * rows)
+        assert rows_used(pad_rows(runs)) == rows
+        assert pad_rows(runs).step == pytest.approx(PERIOD)
