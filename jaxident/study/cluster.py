@@ -4,6 +4,7 @@ Only this process writes: workers return arrays, and need neither the study's fo
 """
 
 import contextlib
+import gc
 import itertools
 import logging
 import re
@@ -40,11 +41,15 @@ def connected(scheduler: str) -> Iterator[Any]:
     with contextlib.ExitStack() as stack:
         if local:
             scheduler = stack.enter_context(_local_cluster(int(local[1])))
+        client, failure = None, ""
         try:
-            client = stack.enter_context(distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False))
+            client = distributed.Client(scheduler, timeout=PATIENCE, set_as_default=False)
         except (OSError, ValueError) as error:
-            raise InputError(f"--scheduler {scheduler}: nobody answers there: {error}") from None
-        yield client
+            failure = str(error)
+        if client is None:
+            gc.collect()  # else Python may collect, and so close, the failed client while another one starts: both wait
+            raise InputError(f"--scheduler {scheduler}: nobody answers there: {failure}")
+        yield stack.enter_context(client)
 
 
 @contextlib.contextmanager

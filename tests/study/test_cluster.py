@@ -1,5 +1,6 @@
 """Chunks as tasks of a local Dask cluster; without Dask these are skipped."""
 
+import gc
 import http.client
 import os
 import signal
@@ -20,6 +21,19 @@ def test_what_is_no_scheduler_is_refused():
     for text in ("local", "local:0", "local:x", "nothing"):
         with pytest.raises(InputError, match="--scheduler"), connected(text):
             pass
+
+
+def test_a_client_that_nobody_answers_is_gone_at_once():
+    """Collected later, while another client starts, it would wait for a lock that this one holds, and the other way."""
+    from distributed import Client
+
+    gc.disable()
+    try:
+        with pytest.raises(InputError, match="nobody answers"), connected("nothing"):
+            pass
+        assert not [one for one in gc.get_objects() if isinstance(one, Client)]
+    finally:
+        gc.enable()
 
 
 @pytest.mark.slow
