@@ -2,6 +2,7 @@
 
 import os
 import pathlib
+import tempfile
 from collections.abc import Iterator
 
 import jax
@@ -14,7 +15,12 @@ if "JAXIDENT_CHECK_SHAPES" in os.environ:  # types and shapes of every call; bef
 
 from jaxident.start import start_jax
 
-start_jax(cache="JAXIDENT_CACHE" in os.environ)  # as the program does; a folder given for it is fresh and the run's own
+if (
+    "JAXIDENT_CACHE" not in os.environ
+):  # both workers of a run, and the programs that they start, share what is compiled
+    FRESH = tempfile.TemporaryDirectory(prefix="jaxident-tests-")
+    os.environ["JAXIDENT_CACHE"] = FRESH.name
+start_jax()
 
 SHARED = pathlib.Path(__file__).resolve().parents[2] / "shared"
 
