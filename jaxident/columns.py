@@ -96,6 +96,33 @@ def make_column(name: str, source: str, unit: str | float) -> Column:
     return Column(source, multiply, divide, shift if parts["name"] else shift / multiply)
 
 
+def after(own: Columns, change: Columns) -> dict[str, Column]:
+    """The columns that read a file as `own` does and then make a `change`: what `change` calls a source has its name
+    in a log."""
+    changed = {}
+    for name, then in change.items():
+        first = own.get(then.source, Column(then.source))
+        shift = first.shift + then.shift * first.divide / first.multiply
+        changed[name] = Column(first.source, first.multiply * then.multiply, first.divide * then.divide, shift)
+    return {**own, **changed}
+
+
+def columns_text(columns: Columns) -> str:
+    """The columns as the text that `parse_columns` reads, numbers to twelve digits."""
+    return ",".join(f"{name}={column.source}{_unit_text(name, column)}" for name, column in columns.items())
+
+
+def _unit_text(name: str, column: Column) -> str:
+    """ ":UNIT" of a column, in the words of a unit where one has its factor."""
+    factor = column.multiply / column.divide
+    if (factor, column.shift) == (1.0, 0.0):
+        return ""
+    units = (unit for unit, (up, down) in UNITS.get(name, {}).items() if abs(up / down / factor - 1.0) < 1e-12)
+    unit = next(units, None)
+    shift = column.shift if unit else column.shift * factor
+    return f":{unit or format(factor, '.12g')}{format(shift, '+.12g') if shift else ''}"
+
+
 def rename(header: Iterable[str], columns: Columns, place: str) -> list[str]:
     """The header in the words of a log: sources get their new names, columns of a log whose name another takes lose it.
 

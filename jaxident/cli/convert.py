@@ -1,17 +1,14 @@
 """`jaxident convert`."""
 
-import re
-
 import click
 
+from jaxident.cli.advice import for_speeds, warn, with_offset
 from jaxident.cli.convert_options import FRAMES, ORDER, OffsetOption
 from jaxident.cli.progress import working
 from jaxident.cli.record import Recorded, origin, tell_origin
-from jaxident.cli.session import ColumnsOption, above_zero, check_outputs, columns_option, table, warn, wrote
+from jaxident.cli.session import ColumnsOption, above_zero, check_outputs, columns_option, table, wrote
 
 NEEDED = "give --commands CSV --poses CSV, or --bag PATH, or --log LOG"
-OFFSET_ADVICE = re.compile(r"jaxident convert --log LOG --pose-offset (\S+) --out NEW")
-"""As `suspicions` words it."""
 
 
 @click.command("convert", cls=Recorded)
@@ -84,8 +81,9 @@ def command(**chosen):
     for note in notes:
         click.echo(note)
     own = chosen["columns"] | chosen["command_columns"] | chosen["pose_columns"] | chosen["wheels_columns"]
-    lines = [_with_offset(line, offset, bool(chosen["log"])) for line in doubts]
-    warn(_for_speeds(lines) if chosen["track"] else lines, own)
+    lines = [with_offset(line, offset, bool(chosen["log"])) for line in doubts]
+    parted = chosen["command_columns"] or chosen["pose_columns"] or chosen["wheels_columns"]
+    warn(for_speeds(lines) if chosen["track"] else lines, own, whole=not parted)
     click.echo(_counted(log))
     wrote(out)
     tell_origin(out, made)
@@ -130,22 +128,15 @@ def _check_sources(chosen) -> None:
         raise click.UsageError(f"--{foreign.replace('_', '-')} is for two streams; --log LOG has its rows already")
 
 
-def _with_offset(line: str, offset: float, finished: bool) -> str:
-    """A line about clocks that differ with the offset for this call: what is left and what was given already."""
-    found = OFFSET_ADVICE.search(line)
-    if not found:
-        return line
-    option = f"--pose-offset {float(found[1]) + offset:.3g}"
-    return line.replace(found[0], f"jaxident convert {f'--log LOG {option} --out NEW' if finished else option}")
-
-
 def _from_log(chosen):
     """The log made of a finished one, the offset, and notes, a line each."""
+    from jaxident.estimation.suspicions.checks import check_log_rate
     from jaxident.files.logs import read_whole
     from jaxident.files.offset import estimate_log_offset
     from jaxident.files.shifted import shift_poses
 
     log = read_whole(chosen["log"], chosen["columns"])
+    check_log_rate(log)
     offset, told = _offset(chosen, lambda: estimate_log_offset(log))
     if chosen["wheels_offset"] == 0.0:
         return shift_poses(log, offset, chosen["period"]), offset, told
@@ -198,21 +189,6 @@ def _offset(chosen, estimate):
     found = estimate()
     error = f"standard error {found.standard_error:.1g} s"
     return found.offset, (f"--pose-offset {found.offset:.6f} ({error}; a delay of the robot counts in it)",)
-
-
-IN_SPEEDS = {
-    "--columns u_r=u_l,u_l=u_r": "--columns w=w:-1",
-    "--columns u_r=u_r:-1,u_l=u_l:-1": "--columns v=v:-1,w=w:-1",
-    "--columns u_r=u_l:-1,u_l=u_r:-1": "--columns v=v:-1",
-}
-"""What mends commands of wheels, in terms of the speeds that they were made from."""
-
-
-def _for_speeds(lines):
-    """The lines, their options those of commands in v,w; a single wheel that is reversed has none."""
-    for wheels, speeds in IN_SPEEDS.items():
-        lines = [line.replace(f"`{wheels}`", f"`{speeds}`") for line in lines]
-    return lines
 
 
 def _from_files(chosen):

@@ -4,6 +4,7 @@ import dataclasses
 
 import click
 
+from jaxident.cli.advice import warn
 from jaxident.cli.progress import working
 from jaxident.cli.record import Recorded, origin, with_provenance
 from jaxident.cli.session import (
@@ -14,7 +15,6 @@ from jaxident.cli.session import (
     json_option,
     seed_option,
     table,
-    warn,
     write_json,
     wrote,
 )

@@ -3,7 +3,6 @@
 import json
 import math
 import os
-import re
 from typing import Any
 
 import click
@@ -51,17 +50,6 @@ class ColumnsOption(click.ParamType):
 columns_option = click.option(
     "--columns", type=ColumnsOption(), default="", help="Columns with other names or units, as in "
     "t=time_ms:ms,x=X:mm,theta=yaw:deg; u_r=u_l,u_l=u_r swaps the wheels, y=y:-1 turns a sign.")  # fmt: skip
-
-
-def warn(lines, columns=None) -> None:
-    """Each line as a warning on stderr; options in it name the columns of the user's file."""
-    for line in lines:
-        told = re.sub(r"(?<=[ ,`])(\w+)=(\w+)(?=[:,`])", lambda m: f"{m[1]}={_source(m[2], columns)}", line)
-        click.echo(f"warning: {told}", err=True)
-
-
-def _source(name: str, columns) -> str:
-    return columns[name].source if columns and name in columns else name
 
 
 seed_option = click.option(

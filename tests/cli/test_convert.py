@@ -75,8 +75,30 @@ def test_what_looks_wrong_is_said_with_the_option_that_mends_it(tmp_path, run):
     words = ("convert", "--commands", "c.csv", "--poses", "p.csv", *OWN, "--track", TRACK, "--out", "log.csv",
              "--command-columns", "w=w:-1")  # fmt: skip
     told = jaxident(*words, cwd=tmp_path).stderr
-    assert "right and left are swapped (`--columns w=w:-1`), or y points down (`--columns y=Y:-1,theta=yaw:-1`)" in told
-    assert "positions in millimetres instead of metres? `--columns x=X:mm,y=Y:mm`" in told
+    assert (
+        "right and left are swapped (`--columns w=w`), or y points down (`--columns y=Y:-0.001,theta=yaw:-0.01" in told
+    )
+    assert "than metres: `--columns x=X:um,y=Y:um` (then 0.15 m) or" in told
+
+
+def test_the_option_that_is_told_mends_a_file_of_other_words(tmp_path, run):
+    """It stands in the place of the one that was given, and is whole."""
+    rows = np.column_stack([1e3 * run.t, run.u_r, run.u_l, 1e3 * run.x, -1e3 * run.y, np.degrees(run.theta)])
+    head = "time_ms,right,left,X,Y,yaw"
+    np.savetxt(tmp_path / "own.csv", rows, delimiter=",", header=head, comments="", fmt="%.9f")
+    given = "t=time_ms:ms,u_r=right,u_l=left,x=X:mm,y=Y:mm,theta=yaw:deg"
+    told = jaxident("convert", "--log", "own.csv", "--columns", given, "--out", "log.csv", cwd=tmp_path).stderr
+    option = re.search(r"mirrored: `--columns (\S+)` if y points down", told)[1]
+    made = jaxident("convert", "--log", "own.csv", "--columns", option, "--out", "log.csv", cwd=tmp_path)
+    assert (made.returncode, made.stderr) == (0, "")
+    np.testing.assert_allclose(np.stack(tuple(read_log(tmp_path / "log.csv"))[:6]), np.stack(tuple(run)[:6]), atol=1e-8)
+
+
+def test_times_in_another_unit_are_refused(tmp_path, run):
+    write_log(run._replace(t=1e3 * run.t), tmp_path / "log.csv")
+    made = jaxident("convert", "--log", "log.csv", "--out", "mended.csv", cwd=tmp_path)
+    refused(made, "--columns t=t:ms takes them for ms")
+    assert not (tmp_path / "mended.csv").exists()
 
 
 @pytest.mark.parametrize("form", FORMATS)
@@ -133,7 +155,7 @@ def test_a_log_of_another_program_is_identified(tmp_path, run):
     found = jaxident("identify", "own.csv", "--columns", "t=stamp:ms,u_r=right,u_l=left,x=X,y=Y,theta=yaw",
                      "--method", "key-term-least-squares", cwd=tmp_path)  # fmt: skip
     assert found.returncode == 0, found.stderr
-    assert "swapped (`--columns u_r=left,u_l=right`)" in found.stderr
+    assert "swapped (`--columns t=stamp:ms,u_r=left,u_l=right,x=X,y=Y,theta=yaw`)" in found.stderr
 
 
 def late_log(folder, run):

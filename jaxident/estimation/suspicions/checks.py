@@ -3,7 +3,7 @@
 import numpy as np
 
 from jaxident.errors import InputError
-from jaxident.estimation.suspicions.log_suspicions import misread_heading
+from jaxident.estimation.suspicions.heading import DEGREES, misread_heading
 from jaxident.estimation.suspicions.wheel_answer import answer_of_wheels, told
 from jaxident.estimation.suspicions.wheel_suspicions import wheels_turn
 from jaxident.log import Log
@@ -19,14 +19,13 @@ STILL_RATIO = 2.0
 def check_informative(log: Log) -> None:
     """InputError with the reason if the log cannot show how the robot answers its commands."""
     seen = np.isfinite(log.x) & np.isfinite(log.y) & np.isfinite(log.theta)
-    steps = [np.diff(np.asarray(run.t)[np.isfinite(run.x)]) for run in log.runs()]
-    check_pose_rate("log", np.concatenate(steps))
+    check_log_rate(log)
     if np.count_nonzero(seen) < 3:
         raise InputError(f"{np.count_nonzero(seen)} measured poses: at least 3 are needed to see any motion")
     if all(np.ptp(np.asarray(u)) == 0.0 for u in log.command):
         raise InputError("no excitation: both commands are constant, so nothing shows how the robot answers them")
     turn = _turn(log, seen)
-    if turn > LOST_HEADING and "degrees" not in misread_heading(log):  # these are told, and fitted
+    if turn > LOST_HEADING and not _in_degrees(log):  # these are told, and fitted
         raise InputError(
             f"the headings turn by {turn:.2g} rad from pose to pose (root mean square), where headings at random turn "
             "by 1.8 rad: they are noise, or of a robot that turns faster than the camera sees"
@@ -36,6 +35,17 @@ def check_informative(log: Log) -> None:
             "nothing moves: the poses are at rest within the camera's noise while the commands change"
             + (_in_the_air(log) if wheels_turn(log) else "")
         )
+
+
+def check_log_rate(log: Log) -> None:
+    """InputError where the poses of a log come at no camera's rate: its times have another unit."""
+    steps = [np.diff(np.asarray(run.t)[np.isfinite(run.x)]) for run in log.runs()]
+    check_pose_rate("log", np.concatenate(steps))
+
+
+def _in_degrees(log: Log) -> bool:
+    misread = misread_heading(log)
+    return misread is not None and misread.reading is DEGREES
 
 
 def _in_the_air(log: Log) -> str:

@@ -154,8 +154,8 @@ def unit(response: Response) -> str:
         )
     if radius > LARGEST_RATIO * track or abs(radius - 1.0) < NEAR_ONE:
         return told + (
-            "rim speeds in m/s instead of rad/s? `--columns wheel_r=wheel_r:K,wheel_l=wheel_l:K` multiplies by K, "
-            "which is 1 over the radius in metres"
+            "rim speeds in m/s instead of rad/s? Multiply them by 1 over the radius in metres, for 0.05 m by "
+            "`--columns wheel_r=wheel_r:20,wheel_l=wheel_l:20`"
         )
     return ""
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from jaxident.estimation.poses.parameters import Robot
-from jaxident.estimation.suspicions.log_suspicions import log_suspicions, motions, odometry_suspicions
+from jaxident.estimation.suspicions.log_suspicions import log_suspicions, odometry_suspicions
+from jaxident.estimation.suspicions.motions import motions
 from jaxident.files.models import load_model
 from jaxident.log import Log, join
 from jaxident.robot.drive import Physical
@@ -58,9 +59,6 @@ def test_clean_runs_with_gaps_are_left_in_peace(log):
     [
         (lambda log: log._replace(theta=np.degrees(log.theta)), "degrees"),
         (lambda log: log._replace(theta=np.degrees(np.angle(np.exp(1j * log.theta)))), "degrees"),
-        (lambda log: log._replace(y=-log.y), "mirrored"),
-        (lambda log: log._replace(x=log.y, y=log.x), "swapped"),
-        (lambda log: log._replace(theta=log.theta + 0.5 * np.pi), "quarter turn"),
         (lambda log: log._replace(theta=log.theta + np.pi * (np.arange(600) // 3 % 40 == 7)), "half a turn 10 times"),
     ],
 )
@@ -82,7 +80,14 @@ def test_frames_and_units_of_the_heading(changed, words, noise):
         ("u_r=u_r:-1", "right wheel runs backwards under positive commands: `--columns u_r=u_r:-1`"),
         ("u_l=u_l:-1", "left wheel runs backwards under positive commands: `--columns u_l=u_l:-1`"),
         ("theta=theta:180", "degrees: `--columns theta=theta:deg`"),
-        ("x=x:1000,y=y:1000", "positions in millimetres instead of metres? `--columns x=x:mm,y=y:mm`"),
+        ("y=y:-1", "mirrored: `--columns y=y:-1` if y points down"),
+        ("theta=theta:-1", "mirrored: `--columns theta=theta:-1` if theta counts clockwise"),
+        ("x=y,y=x", "as if x and y were swapped: `--columns x=y,y=x` if they are"),
+        ("theta=theta:-1+1.5708", "swapped: `--columns theta=theta:-1+1.5708` if theta counts clockwise from y"),
+        ("theta=theta:rad+1.5708", "a quarter turn off, the marker sits sideways: `--columns theta=theta:rad-1.5708`"),
+        ("theta=theta:rad-1.5708", "a quarter turn off, the marker sits sideways: `--columns theta=theta:rad+1.5708`"),
+        ("x=x:100,y=y:100", "than metres: `--columns x=x:cm,y=y:cm` (then 0.0"),
+        ("x=x:1000,y=y:1000", "than metres: `--columns x=x:mm,y=y:mm` (then 0.0"),
     ],
 )
 def test_what_is_wrong_is_said_with_the_option_that_mends_it(log, columns, words):
@@ -90,7 +95,7 @@ def test_what_is_wrong_is_said_with_the_option_that_mends_it(log, columns, words
     wrong = Log.from_dataframe(log._asdict(), columns.replace(":180", f":{180 / np.pi}"))
     (line,) = said(wrong)
     assert words in line
-    option = re.findall(r"--columns ([^`]*)`", line)[-1 if "points down" in words or "swapped" not in line else 0]
+    option = re.search(r"--columns ([^`]*)`", words)[1]
     assert said(Log.from_dataframe(wrong._asdict(), option)) == ()
 
 
