@@ -88,7 +88,7 @@ def test_the_option_that_is_told_mends_a_file_of_other_words(tmp_path, run):
     np.savetxt(tmp_path / "own.csv", rows, delimiter=",", header=head, comments="", fmt="%.9f")
     given = "t=time_ms:ms,u_r=right,u_l=left,x=X:mm,y=Y:mm,theta=yaw:deg"
     told = jaxident("convert", "--log", "own.csv", "--columns", given, "--out", "log.csv", cwd=tmp_path).stderr
-    option = re.search(r"mirrored: `--columns (\S+)` if y points down", told)[1]
+    option = re.search(r"y axis points down: `--columns (\S+)`", told)[1]
     made = jaxident("convert", "--log", "own.csv", "--columns", option, "--out", "log.csv", cwd=tmp_path)
     assert (made.returncode, made.stderr) == (0, "")
     np.testing.assert_allclose(np.stack(tuple(read_log(tmp_path / "log.csv"))[:6]), np.stack(tuple(run)[:6]), atol=1e-8)

@@ -25,37 +25,36 @@ BACKWARDS: Signs = (-1, -1, 1, -1)
 
 
 class Reading(NamedTuple):
-    """Another way to read the heading column: what the column looks like, the headings [rad] that it then gives, and
-    what mends the log, by the signs of the gains under these headings."""
+    """Another way to read the heading column: the headings [rad] that it gives, and by the signs of the gains under
+    them what the column looks like, with the option that mends the log."""
 
-    looks: str
     read: Callable[[np.ndarray], np.ndarray]
-    mends: dict[Signs, str]
+    looks: dict[Signs, str]
 
 
-DEGREES = Reading("in degrees", np.radians, {RIGHT: "`--columns theta=theta:deg`"})
+DEGREES = Reading(np.radians, {RIGHT: "in degrees: `--columns theta=theta:deg`"})
 READINGS = (
     DEGREES,
     Reading(
-        "mirrored",
         np.negative,
         {
-            AGAINST: "`--columns y=y:-1` if y points down, as in a picture",
-            RIGHT: "`--columns theta=theta:-1` if theta counts clockwise",
+            AGAINST: "mirrored, as in a picture whose y axis points down: `--columns y=y:-1`",
+            RIGHT: "counted clockwise: `--columns theta=theta:-1`",
         },
     ),
     Reading(
-        "as if x and y were swapped",
         lambda theta: 0.5 * np.pi - theta,
         {
-            AGAINST: "`--columns x=y,y=x` if they are",
-            RIGHT: "`--columns theta=theta:-1+1.5708` if theta counts clockwise from y, as a compass does",
+            AGAINST: "as if x and y were swapped: `--columns x=y,y=x`",
+            RIGHT: "counted clockwise from the y axis, as on a compass: `--columns theta=theta:-1+1.5708`",
         },
     ),
     Reading(
-        "a quarter turn off, the marker sits sideways",
         lambda theta: theta + 0.5 * np.pi,
-        {RIGHT: "`--columns theta=theta:rad+1.5708`", BACKWARDS: "`--columns theta=theta:rad-1.5708`"},
+        {
+            RIGHT: "a quarter turn off, the marker sits sideways: `--columns theta=theta:rad+1.5708`",
+            BACKWARDS: "a quarter turn off, the marker sits sideways: `--columns theta=theta:rad-1.5708`",
+        },
     ),
 )
 
@@ -68,11 +67,11 @@ class Misread(NamedTuple):
     read: float
 
     def told(self, signs: Signs | None) -> str:
-        """The line for the user; `signs` of the gains under the new reading choose what mends it, None tells all."""
-        mends = self.reading.mends
-        mend = mends[signs] if signs in mends else ", ".join(mends.values())
+        """The line for the user; `signs` of the gains under the new reading choose what mends it, others tell all."""
+        looks = self.reading.looks
+        found = looks[signs] if signs in looks else ", or ".join(looks.values())
         numbers = f"{100 * self.given:.0f} % of the motion is sideways, {100 * self.read:.0f} % if it were"
-        return f"the heading does not point where the robot goes ({numbers}): it looks {self.reading.looks}: {mend}"
+        return f"the heading does not point where the robot goes ({numbers}): it looks {found}"
 
 
 def flipped_heading(log: Log, single: Motions) -> str:
