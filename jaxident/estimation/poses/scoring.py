@@ -22,6 +22,8 @@ TOLERANCE = 1e-7
 KINK_STEP, KINK_TOLERANCE = 1e-2, 1e-4
 """At a kink: steps of dead zones below this many standard deviations fail, and the rest promises less than this."""
 DEAD_ZONES = slice(6, 8)
+SHORTEST = 0.1
+"""Least part of a step that is walked."""
 LONGEST_LOG_STEP, LONGEST_SHARE = 1.5, 0.25
 """A step changes a logarithm by at most this much, and a dead zone by this share of its bound."""
 
@@ -39,13 +41,15 @@ class Damping(NamedTuple):
 
 class Search(NamedTuple):
     """Where a search stands: its best point, the curvature there, the point to look at next and whether its dead zones
-    are held as they were, damping, whole steps that failed one after the other, steps taken, whether it has arrived."""
+    are held as they were, damping, part of a step that is walked, whole steps that failed one after the other, steps
+    taken, whether it has arrived."""
 
     point: Point
     local: Local
     proposed: Point
     holding: Any
     damping: Any
+    length: Any
     failures: Any
     steps: Any
     arrived: Any
@@ -103,13 +107,29 @@ def propose(search: Search, kinked: Array, law: Law, low: Array, high: Array) ->
     step, starts = (jnp.where(holding, part[1], part[0]) for part in (steps, starts))
     longest = jnp.where(is_logarithmic(law), LONGEST_LOG_STEP, jnp.inf)
     longest = longest.at[DEAD_ZONES].set(LONGEST_SHARE * high[DEAD_ZONES])
-    part = jnp.minimum(1.0, jnp.min(longest / jnp.maximum(jnp.abs(step), 1e-300)))
+    part = jnp.minimum(search.length, jnp.min(longest / jnp.maximum(jnp.abs(step), 1e-300)))
     shared = along_steady_speeds(point.shared, part * step)
     moved = Point(jnp.clip(shared, low, high), point.starts + part * starts)
     level = (promised >= 0.0) & (promised < TOLERANCE) & (damping.dead_zones <= FIRST_DAMPING)
     tiny = jnp.abs(steps[0]) * jnp.sqrt(jnp.diagonal(local.shared)) < KINK_STEP
     kink = (rest >= 0.0) & (rest * (1.0 + damping.others) < KINK_TOLERANCE) & jnp.all(tiny[DEAD_ZONES])
     return moved, holding, level | kink
+
+
+def length_after(search: Search, there: Point, local: Local) -> Array:
+    """The part of the next step to walk: expected curvature along the last one over what the gradients at its ends
+    tell (Barzilai and Borwein 1988), at most 1.
+
+    Where the law is wrong the likelihood bends more than it is expected to. Whole steps then jump from one side of the
+    valley to the other.
+    """
+    step = jax.tree.map(jnp.subtract, there, search.point)
+    slopes = jax.tree.map(jnp.subtract, local.gradient, search.local.gradient)
+    told = jnp.sum(step.shared * slopes.shared) + jnp.sum(step.starts * slopes.starts)
+    old = search.local
+    along = old.shared @ step.shared + 2.0 * jnp.einsum("rns,rs->n", old.between, step.starts)
+    expected = step.shared @ along + jnp.einsum("rs,rst,rt->", step.starts, old.starts, step.starts)
+    return jnp.where(told > expected, jnp.maximum(expected / told, SHORTEST), 1.0)
 
 
 def adapt(search: Search, better: Array) -> Search:
@@ -139,9 +159,10 @@ def search_from(point: Point, runs: Runs, law: Law, d_max: Array, most: int, pri
     def body(search):
         there, local = local_at_best_deviations(search.proposed, runs, law)
         local = with_prior(local, there.shared, law, prior)
+        length = length_after(search, there, local)
         better = (local.value <= search.local.value) | (search.steps == 0)
         point, local = jax.tree.map(lambda a, b: jnp.where(better, a, b), (there, local), (search.point, search.local))
-        after = adapt(search, better)._replace(point=point, local=local, steps=search.steps + 1)
+        after = adapt(search, better)._replace(point=point, local=local, steps=search.steps + 1, length=length)
         kinked = (after.failures > 1) & ~search.holding
         proposed, holding, arrived = propose(after, kinked, law, low, high)
         return after._replace(proposed=proposed, holding=holding, arrived=arrived)
@@ -153,4 +174,4 @@ def search_from(point: Point, runs: Runs, law: Law, d_max: Array, most: int, pri
     shapes = (unknown, unknown), (count, START_STATES, START_STATES), (count, unknown, START_STATES)
     nothing = Local(jnp.asarray(jnp.inf), jax.tree.map(jnp.zeros_like, point), *map(jnp.zeros, shapes))
     damping, no, none = Damping(*jnp.full(2, FIRST_DAMPING)), jnp.asarray(False), jnp.asarray(0)
-    return jax.lax.while_loop(walking, body, Search(point, nothing, point, no, damping, none, none, no))
+    return jax.lax.while_loop(walking, body, Search(point, nothing, point, no, damping, jnp.asarray(1.0), none, none, no))
