@@ -81,6 +81,22 @@ def newton(local: Local, damping: Damping, held: Array) -> tuple[Unknowns, RunSt
     return step, starts, promised
 
 
+def cut_newton(local: Local, damping: Damping, held: Array, law: Law) -> tuple[Unknowns, RunStates, Array]:
+    """The same step with logarithms that would go too far cut and all others best beside these, and what it promises.
+
+    A memory that fades within a row, or no slip at all, bends nothing: its step of 1e13 must not shorten the others'.
+    """
+    step, _, _ = newton(local, damping, held)
+    far = is_logarithmic(law) & (jnp.abs(step) > LONGEST_LOG_STEP)
+    cut = jnp.where(far, jnp.clip(step, -LONGEST_LOG_STEP, LONGEST_LOG_STEP), 0.0)
+    slope = Point(
+        local.gradient.shared + local.shared @ cut,
+        local.gradient.starts + jnp.einsum("rns,n->rs", local.between, cut),
+    )
+    rest, starts, promised = newton(local._replace(gradient=slope), damping, held | far)
+    return cut + rest, starts, promised - cut @ (local.gradient.shared + 0.5 * local.shared @ cut)
+
+
 def along_steady_speeds(shared: Unknowns, step: Unknowns) -> Unknowns:
     """A vector (unknowns,) moved by a step. Gains move so that steady speeds, gain over rate, move in a straight line:
     poses tell these best, and a rate that hardly matters would otherwise drag them along."""
@@ -100,9 +116,9 @@ def propose(search: Search, kinked: Array, law: Law, low: Array, high: Array) ->
     """
     point, local, damping = search.point, search.local, search.damping
     slope = local.gradient.shared
-    held = ((point.shared <= low) & (slope > 0.0)) | ((point.shared >= high) & (slope < 0.0))
+    held = ((point.shared <= low) & (slope >= 0.0)) | ((point.shared >= high) & (slope <= 0.0))
     both = jnp.stack([held, held.at[DEAD_ZONES].set(True)])
-    steps, starts, (promised, rest) = jax.vmap(lambda held: newton(local, damping, held))(both)
+    steps, starts, (promised, rest) = jax.vmap(lambda held: cut_newton(local, damping, held, law))(both)
     holding = kinked & (rest > KINK_TOLERANCE)
     step, starts = (jnp.where(holding, part[1], part[0]) for part in (steps, starts))
     longest = jnp.where(is_logarithmic(law), LONGEST_LOG_STEP, jnp.inf)
@@ -174,4 +190,6 @@ def search_from(point: Point, runs: Runs, law: Law, d_max: Array, most: int, pri
     shapes = (unknown, unknown), (count, START_STATES, START_STATES), (count, unknown, START_STATES)
     nothing = Local(jnp.asarray(jnp.inf), jax.tree.map(jnp.zeros_like, point), *map(jnp.zeros, shapes))
     damping, no, none = Damping(*jnp.full(2, FIRST_DAMPING)), jnp.asarray(False), jnp.asarray(0)
-    return jax.lax.while_loop(walking, body, Search(point, nothing, point, no, damping, jnp.asarray(1.0), none, none, no))
+    return jax.lax.while_loop(
+        walking, body, Search(point, nothing, point, no, damping, jnp.asarray(1.0), none, none, no)
+    )
