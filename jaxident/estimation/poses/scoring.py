@@ -82,19 +82,31 @@ def newton(local: Local, damping: Damping, held: Array) -> tuple[Unknowns, RunSt
 
 
 def cut_newton(local: Local, damping: Damping, held: Array, law: Law) -> tuple[Unknowns, RunStates, Array]:
-    """The same step with logarithms that would go too far cut and all others best beside these, and what it promises.
+    """The same step with logarithms that would go too far cut, all others best beside these, and what it promises.
 
     A memory that fades within a row, or no slip at all, bends nothing: its step of 1e13 must not shorten the others'.
+    Logarithms are cut one by one or, where two that act alike then lead uphill, by one factor; that promises infinity,
+    for it says nothing of how near the minimum is.
     """
     step, _, _ = newton(local, damping, held)
     far = is_logarithmic(law) & (jnp.abs(step) > LONGEST_LOG_STEP)
-    cut = jnp.where(far, jnp.clip(step, -LONGEST_LOG_STEP, LONGEST_LOG_STEP), 0.0)
-    slope = Point(
-        local.gradient.shared + local.shared @ cut,
-        local.gradient.starts + jnp.einsum("rns,n->rs", local.between, cut),
+    whole = jnp.where(far, step, 0.0)
+    longest = jnp.maximum(jnp.max(jnp.abs(whole)), LONGEST_LOG_STEP)
+    cuts = jnp.stack([jnp.clip(whole, -LONGEST_LOG_STEP, LONGEST_LOG_STEP), whole * (LONGEST_LOG_STEP / longest)])
+
+    def beside(cut: Unknowns) -> tuple[Unknowns, RunStates, Array]:
+        starts = local.gradient.starts + jnp.einsum("rns,n->rs", local.between, cut)
+        slope = Point(local.gradient.shared + local.shared @ cut, starts)
+        rest, starts, promised = newton(local._replace(gradient=slope), damping, held | far)
+        return cut + rest, starts, promised - cut @ (local.gradient.shared + 0.5 * local.shared @ cut)
+
+    steps, starts, promised = jax.vmap(beside)(cuts)
+    downhill = ~(promised[0] < 0.0)
+    return (
+        jnp.where(downhill, steps[0], steps[1]),
+        jnp.where(downhill, starts[0], starts[1]),
+        jnp.where(downhill, promised[0], jnp.inf),
     )
-    rest, starts, promised = newton(local._replace(gradient=slope), damping, held | far)
-    return cut + rest, starts, promised - cut @ (local.gradient.shared + 0.5 * local.shared @ cut)
 
 
 def along_steady_speeds(shared: Unknowns, step: Unknowns) -> Unknowns:
