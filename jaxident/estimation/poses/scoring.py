@@ -187,8 +187,9 @@ def search_from(point: Point, runs: Runs, law: Law, d_max: Array, most: int, pri
     def body(search):
         there, local = local_at_best_deviations(search.proposed, runs, law)
         local = with_prior(local, there.shared, law, prior)
-        length = length_after(search, there, local)
         better = (local.value <= search.local.value) | (search.steps == 0)
+        tells = better | search.holding  # a whole step may have failed at a kink, which is no curvature
+        length = jnp.where(tells, length_after(search, there, local), 1.0)
         point, local = jax.tree.map(lambda a, b: jnp.where(better, a, b), (there, local), (search.point, search.local))
         after = adapt(search, better)._replace(point=point, local=local, steps=search.steps + 1, length=length)
         kinked = (after.failures > 1) & ~search.holding
