@@ -88,7 +88,7 @@ def check_pose_rate(name: str, steps: Any) -> None:
         return
     scale = {unit: median / size for unit, size in (("ms", 1e3), ("us", 1e6), ("ns", 1e9), ("min", 1.0 / 60.0))}
     unit = min(scale, key=lambda unit: abs(np.log(max(scale[unit], 1e-300) / USUAL_STEP)))
-    option = f": --columns t=t:{unit} takes them for {unit}" if FASTEST <= scale[unit] <= SLOWEST else ""
+    option = f": `--columns t=t:{unit}` takes them for {unit}" if FASTEST <= scale[unit] <= SLOWEST else ""
     raise InputError(
         f"{name}: the poses are {median:.4g} s apart; {FASTEST:g} to {SLOWEST:g} s are read. Are the times in another "
         f"unit{option}?"

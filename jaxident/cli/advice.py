@@ -1,6 +1,9 @@
 """What commands say of a log that looks wrong: warnings, with the options that mend the user's own files."""
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from shlex import quote
 
 import click
 
@@ -15,22 +18,35 @@ IN_SPEEDS = {
 
 
 def warn(lines, columns=None, whole=True) -> None:
-    """Each line as a warning on stderr. Its `--columns` become the option for the user's file, which is read by
-    `columns`: all of them, or without `whole` those alone that change."""
-    from jaxident.columns import columns_text
-
-    log = f"convert --log LOG --columns {columns_text(columns)}" if columns and whole else "convert --log LOG"
+    """Each line as a warning on stderr, its options those for the user's file; see `for_file`."""
     for line in lines:
-        told = re.sub(r"--columns ([^`]*)(?=`)", lambda option: _for_file(option[1], columns or {}, whole), line)
-        click.echo(f"warning: {told.replace('convert --log LOG', log)}", err=True)
+        click.echo(f"warning: {for_file(line, columns or {}, whole)}", err=True)
 
 
-def _for_file(option: str, columns, whole: bool) -> str:
+@contextmanager
+def advising(columns, whole=True) -> Iterator[None]:
+    """Errors about a log from within tell the options for the user's file; see `for_file`."""
+    from jaxident.errors import InputError
+
+    try:
+        yield
+    except InputError as error:
+        raise InputError(for_file(str(error), columns, whole)) from error
+
+
+def for_file(line: str, columns, whole: bool) -> str:
+    """The line with options for a file that is read by `columns`: all of these as they are to be, or without `whole`
+    those alone that change."""
     from jaxident.columns import after, columns_text, parse_columns
 
-    change = parse_columns(option)
-    made = after(columns, change)
-    return "--columns " + columns_text({name: made[name] for name in made if whole or name in change})
+    def option(told: re.Match) -> str:
+        change = parse_columns(told[2])
+        made = after(columns, change)
+        return told[1] + quote(columns_text({name: made[name] for name in made if whole or name in change}))
+
+    line = re.sub(r"(--(?:\w+-)?columns )([^`]*)(?=`)", option, line)
+    log = "convert --log LOG"
+    return line.replace(log, f"{log} --columns {quote(columns_text(columns))}") if columns and whole else line
 
 
 def with_offset(line: str, offset: float, finished: bool) -> str:

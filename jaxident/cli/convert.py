@@ -2,7 +2,7 @@
 
 import click
 
-from jaxident.cli.advice import for_speeds, warn, with_offset
+from jaxident.cli.advice import advising, for_speeds, warn, with_offset
 from jaxident.cli.convert_options import FRAMES, ORDER, OffsetOption
 from jaxident.cli.progress import working
 from jaxident.cli.record import Recorded, origin, tell_origin
@@ -74,16 +74,16 @@ def command(**chosen):
     check_outputs(out)
     check_beside(out)
     made = origin("--out")
-    with working("converting"):
+    own = chosen["columns"] | chosen["command_columns"] | chosen["pose_columns"] | chosen["wheels_columns"]
+    whole = not (chosen["command_columns"] or chosen["pose_columns"] or chosen["wheels_columns"])
+    with working("converting"), advising(own, whole):
         log, offset, notes = _from_log(chosen) if chosen["log"] else _from_streams(chosen)
         doubts = log_suspicions(log)
         write_log(log, out)
     for note in notes:
         click.echo(note)
-    own = chosen["columns"] | chosen["command_columns"] | chosen["pose_columns"] | chosen["wheels_columns"]
     lines = [with_offset(line, offset, bool(chosen["log"])) for line in doubts]
-    parted = chosen["command_columns"] or chosen["pose_columns"] or chosen["wheels_columns"]
-    warn(for_speeds(lines) if chosen["track"] else lines, own, whole=not parted)
+    warn(for_speeds(lines) if chosen["track"] else lines, own, whole)
     click.echo(_counted(log))
     wrote(out)
     tell_origin(out, made)

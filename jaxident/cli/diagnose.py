@@ -5,7 +5,7 @@ import os
 
 import click
 
-from jaxident.cli.advice import warn
+from jaxident.cli.advice import advising, warn
 from jaxident.cli.progress import working
 from jaxident.cli.record import Recorded, origin, with_provenance
 from jaxident.cli.session import above_zero, check_outputs, columns_option, seed_option, table, write_json, wrote
@@ -76,7 +76,7 @@ def command(logs, columns, sim, model, horizon, out, seed):
     warn(f"the simulator's logs: {line}" for line in (log_suspicions(join(theirs)) if theirs else ()))
     make_folder(out)  # what cannot be written is told before the work, not after it
     check_outputs(*(os.path.join(out, name) for name in OUTPUTS))
-    with working("diagnosing"):
+    with working("diagnosing"), advising(columns):
         found = diagnose(records, sim=theirs or None, model=nominal, horizon=horizon, seed=seed)
     made = origin(OUTPUTS[0], logs=find_logs(logs), sim=simulated)
     click.echo("\n".join(_told(found)))

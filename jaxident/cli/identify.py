@@ -4,7 +4,7 @@ import dataclasses
 
 import click
 
-from jaxident.cli.advice import warn
+from jaxident.cli.advice import advising, warn
 from jaxident.cli.progress import working
 from jaxident.cli.record import Recorded, origin, with_provenance
 from jaxident.cli.session import (
@@ -108,7 +108,7 @@ def command(logs, columns, method, reading, count, resample, seed, out, report, 
             raise click.UsageError(f"{option} needs the method maximum-likelihood")
     check_outputs(out, report, json_file)
     records = read_logs(logs, columns)
-    with working("identifying"):
+    with working("identifying"), advising(columns):
         found = identify(records, method, reading=reading and reading.replace("-", "_"), **settings)
     _warn(found, columns)
     again = count and _resample(found, records, count, resample, seed, settings["d_max"])

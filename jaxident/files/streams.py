@@ -210,7 +210,7 @@ def _check_overlap(command_t: np.ndarray, pose_t: np.ndarray) -> None:
     if min(len(command_t), len(pose_t)) > FEWEST and max(lengths) > OTHER_UNIT * min(lengths):
         raise InputError(
             f"the commands last {lengths[0]:.6g} s and the poses {lengths[1]:.6g} s: are the times of one in another "
-            "unit? --command-columns t=t:ms or --pose-columns t=t:ms takes them for milliseconds"
+            "unit? `--command-columns t=t:ms` or `--pose-columns t=t:ms` takes them for milliseconds"
         )
     if pose_t[-1] >= command_t[0] and (len(command_t) == 1 or pose_t[0] <= command_t[-1]):
         return

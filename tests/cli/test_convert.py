@@ -97,7 +97,7 @@ def test_the_option_that_is_told_mends_a_file_of_other_words(tmp_path, run):
 def test_times_in_another_unit_are_refused(tmp_path, run):
     write_log(run._replace(t=1e3 * run.t), tmp_path / "log.csv")
     made = jaxident("convert", "--log", "log.csv", "--out", "mended.csv", cwd=tmp_path)
-    refused(made, "--columns t=t:ms takes them for ms")
+    refused(made, "`--columns t=t:ms` takes them for ms")
     assert not (tmp_path / "mended.csv").exists()
 
 
@@ -144,6 +144,19 @@ def test_milliseconds_are_refused_by_identify_and_diagnose(tmp_path, run):
     write_log(run._replace(t=1e3 * run.t), tmp_path / "log.csv")
     for command in ("identify", "diagnose"):
         refused(jaxident(command, "log.csv", cwd=tmp_path), "the poses are 33.33 s apart", "--columns t=t:ms")
+
+
+def test_an_error_about_the_log_tells_the_option_for_the_users_names(tmp_path, run):
+    write_log(run._replace(t=1e3 * run.t), tmp_path / "log.csv")
+    text = (tmp_path / "log.csv").read_text()
+    (tmp_path / "log.csv").write_text(text.replace("t,", "time of day,", 1))
+    for words in (
+        ("convert", "--log", "log.csv", "--out", "new.csv"),
+        ("identify", "log.csv"),
+        ("diagnose", "log.csv"),
+    ):
+        made = jaxident(*words, "--columns", "t=time of day", cwd=tmp_path)
+        refused(made, "`--columns 't=time of day:ms'` takes them for ms")
 
 
 def test_a_log_of_another_program_is_identified(tmp_path, run):

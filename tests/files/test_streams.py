@@ -142,11 +142,11 @@ def test_streams_that_do_not_overlap_are_refused():
 def test_times_in_another_unit_are_refused():
     t = 0.03 * np.arange(100)
     given, seen = Commands(t, Wheels(t, t)), Poses(t, Pose(t, t, t))
-    with pytest.raises(InputError, match=r"the poses are 30 s apart; .* --columns t=t:ms takes them for ms"):
+    with pytest.raises(InputError, match=r"the poses are 30 s apart; .* `--columns t=t:ms` takes them for ms"):
         merge(given, seen._replace(t=1e3 * t))
-    with pytest.raises(InputError, match=r"the poses are 3e[+]07 s apart; .* --columns t=t:ns takes"):
+    with pytest.raises(InputError, match=r"the poses are 3e[+]07 s apart; .* `--columns t=t:ns` takes"):
         merge(given, seen._replace(t=1e9 * t))
-    with pytest.raises(InputError, match=r"commands last 2970 s and the poses 2.97 s: .* --command-columns t=t:ms"):
+    with pytest.raises(InputError, match=r"commands last 2970 s and the poses 2.97 s: .* `--command-columns t=t:ms`"):
         merge(given._replace(t=1e3 * t), seen)
 
 

@@ -12,9 +12,9 @@ from jaxident.log import Log
 SIDEWAYS, STRAIGHT = 0.3, 0.1
 """Share of sideways motion that puzzles, and the one that a better reading of the heading must reach."""
 SURE = 5.0
-"""Standard deviations from zero at which the sign of a gain counts."""
+"""Standard deviations from zero at which the sign of a gain, or an offset, counts."""
 EXPLAINED = 0.1
-"""Least share of the motion's variance that commands explain before anything is read from it."""
+"""Least share of the motion's variance that commands or wheel speeds explain before anything is read from it."""
 Signs = tuple[int, ...]
 RIGHT: Signs = (1, 1, 1, -1)
 """Signs of the gains of a robot whose log is right: right and left wheel along, right and left wheel in turn."""

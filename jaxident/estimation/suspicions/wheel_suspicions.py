@@ -10,15 +10,12 @@ import numpy as np
 
 from jaxident.array_types import Pose, Wheels
 from jaxident.estimation.suspicions.clock_offset import PAUSE, Response, Streams, respond, streams_of
+from jaxident.estimation.suspicions.heading import AGAINST, BACKWARDS, EXPLAINED, SURE, Signs
 from jaxident.estimation.suspicions.wheel_answer import late_wheels, typical_step
 from jaxident.log import Log
 
 MOST = 20_000
 """Rows that are looked at, as in `suspicions`."""
-SURE = 5.0
-"""Standard deviations from zero at which the sign of a gain, or an offset, counts."""
-EXPLAINED = 0.1
-"""Least share of the motion's variance that wheel speeds explain before anything is read from them."""
 QUIET = 2.0
 """Time [s] without a command after which a wheel should stand; the slowest of six real robots stops within 1 s."""
 TURNING = 0.1
@@ -122,11 +119,11 @@ def wheel_signs(response: Response) -> str:
         return "the camera sees motion that does not follow the wheel speeds: are they of this robot, and on its clock?"
     if not clear.all():
         return ""
-    found: dict[tuple[int, ...], str] = {
-        (1, 1, -1, 1): "the robot turns against its wheel speeds, right and left are swapped: `--columns "
+    found: dict[Signs, str] = {
+        AGAINST: "the robot turns against its wheel speeds, right and left are swapped: `--columns "
         "wheel_r=wheel_l,wheel_l=wheel_r`",
         (-1, -1, -1, 1): "both wheel speeds have the wrong sign: `--columns wheel_r=wheel_r:-1,wheel_l=wheel_l:-1`",
-        (-1, -1, 1, -1): "both wheel speeds have the wrong sign and are swapped: `--columns "
+        BACKWARDS: "both wheel speeds have the wrong sign and are swapped: `--columns "
         "wheel_r=wheel_l:-1,wheel_l=wheel_r:-1`",
         (-1, 1, -1, -1): "the right wheel's speed has the wrong sign: `--columns wheel_r=wheel_r:-1`",
         (1, -1, 1, 1): "the left wheel's speed has the wrong sign: `--columns wheel_l=wheel_l:-1`",
