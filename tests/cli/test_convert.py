@@ -140,12 +140,6 @@ def test_wrong_use(tmp_path, run):
     assert not (tmp_path / "log.csv").exists()
 
 
-def test_milliseconds_are_refused_by_identify_and_diagnose(tmp_path, run):
-    write_log(run._replace(t=1e3 * run.t), tmp_path / "log.csv")
-    for command in ("identify", "diagnose"):
-        refused(jaxident(command, "log.csv", cwd=tmp_path), "the poses are 33.33 s apart", "--columns t=t:ms")
-
-
 def test_an_error_about_the_log_tells_the_option_for_the_users_names(tmp_path, run):
     write_log(run._replace(t=1e3 * run.t), tmp_path / "log.csv")
     text = (tmp_path / "log.csv").read_text()

@@ -1,14 +1,15 @@
 """The follower of windows against the full simulator, which integrates with other steps and another rule."""
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from jaxident.array_types import State
+from jaxident.array_types import AT_REST
 from jaxident.diagnosis.motion.paths import push_of, residuals, track
 from jaxident.diagnosis.motion.windows import cut
 from jaxident.diagnosis.preparation.translate import abreast_of_marker
-from jaxident.effects.catalogue import CATALOGUE
+from jaxident.effects.catalogue import CATALOGUE, to_vector
 from jaxident.effects.coordinates import (
     COORDINATES,
     ON_SPEEDS,
@@ -22,10 +23,10 @@ from jaxident.effects.coordinates import (
 )
 from jaxident.effects.fast_input import PUSHING
 from jaxident.effects.fast_motion import report
-from jaxident.effects.simulate import simulate
+from jaxident.effects.full import SHARP_SUBSTEPS, run_full
 from jaxident.log import make_log
 from jaxident.robot.drive import Physical
-from jaxident.robot.model import Effect, Model
+from jaxident.robot.model import Effect
 
 STEP, ROWS = 0.03, 200
 DRIVE = Physical(np.array([4.0, 5.0]), np.array([[1.2, 1.1], [9.0, -8.5]]), np.array([0.02, -1.0]))
@@ -59,8 +60,14 @@ def nominal() -> np.ndarray:
     return neutral_vector(nominal_vector(DRIVE, DEAD_ZONE))
 
 
-def simulated(log, effects=()) -> np.ndarray:
-    return np.stack(simulate(Model(STEP, DRIVE, DEAD_ZONE, effects=effects), log).pose)
+@jax.jit
+def all_effects(vector, log, drive, start):
+    """Poses (3, rows) by the full simulator in the program that holds all effects, on fine substeps."""
+    return jnp.stack(run_full(drive, DEAD_ZONE, vector, log.t, log.command, start, substeps=SHARP_SUBSTEPS))
+
+
+def simulated(log, effects=(), drive=DRIVE, start=AT_REST) -> np.ndarray:
+    return np.asarray(all_effects(to_vector(effects), log, drive, start))
 
 
 def test_without_effects_it_is_the_nominal_robot(log, follow):
@@ -138,8 +145,7 @@ def test_how_far_left_a_marker_is_nothing_tells_but_effects_on_speeds(log, name,
 
     def poses(drive, y, aside):
         effects = (*others, Effect("marker_offset", {"ahead": 0.03, "left": aside}))
-        start = State(0.0, y, 0.0, 0.0, 0.0)
-        return np.stack(simulate(Model(STEP, drive, DEAD_ZONE, effects=effects), log, start=start).pose)
+        return simulated(log, effects, drive, AT_REST._replace(y=y))
 
     apart = np.abs(poses(DRIVE, 0.0, left) - poses(beside(DRIVE, left), left, 0.0)).max()
     assert (apart > 1e-4) == (name in ON_SPEEDS or form == {"coasting": 1.0})
