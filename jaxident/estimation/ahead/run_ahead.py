@@ -57,7 +57,7 @@ def run_ahead(model: Model, log: Log, starts: Starts, horizon: int, *, burn_in: 
     With slip the filter forgets by itself and takes in FORGOTTEN rows at least. Without, it trusts the model for ever:
     the burn-in alone then bounds how far small errors of the model pile up.
     """
-    noise = noise_for(model, until_last_start(log, starts))
+    noise = jax.tree.map(np.float64, noise_for(model, until_last_start(log, starts)))  # one type, one program
     slips = float(noise.slip_along) > 0.0 or float(noise.slip_heading) > 0.0
     before = max(burn_in, FORGOTTEN) if slips else burn_in
     step = float(np.median(np.concatenate([np.diff(run.t) for run in log.runs()])))

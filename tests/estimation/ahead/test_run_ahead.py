@@ -136,8 +136,7 @@ def test_a_start_that_does_not_converge_comes_from_a_run_up_and_is_counted():
     model, log = driven([("motor_lag",)])[0]
     jumps = np.zeros(len(log.t))
     jumps[101:120] = 0.5 * (-1.0) ** np.arange(19)
-    log = log._replace(x=log.x + jumps, y=log.y - jumps)
-    found = predict(model, log, 20, stride=100)
+    found = predict(model, log._replace(x=log.x + jumps, y=log.y - jumps), 20, stride=20)
     told = prediction_error(found, log)
     assert told["run_up"] == 1
     assert told["failed"] == 0
@@ -159,7 +158,7 @@ def test_a_covariance_stays_one_where_poses_are_refused_again_and_again():
     log = log._replace(x=log.x + away)
     starts = every(log, 20, 20)
     stretch = cut_stretches(log, starts, 0, 200, 100, 0.0)
-    found = filter_and_run(vector_of(model), None, noise, None, stretch, 200)
+    found = jax.jit(filter_and_run)(vector_of(model), None, noise, None, stretch, 200)
     assert np.min(found.innovation) >= 0.0
     np.testing.assert_allclose(found.start, np.swapaxes(found.start, 1, 2), rtol=1e-9, atol=1e-12)
 
@@ -200,8 +199,9 @@ def test_a_log_is_known_again_in_its_session():
 
 def test_effects_that_drift_go_by_the_session():
     model = dataclasses.replace(ROBOT, effects=(Effect("gain_drift", {"rate": -0.01}),))
-    log = excite(jax.random.key(1), "multilevel", 200, PERIOD, hold=10)
+    log = excite(jax.random.key(1), "multilevel", 241, PERIOD, hold=10)
     log = jax.tree.map(np.asarray, simulate_with_effects(model, log, session_time=30.0))
-    right, wrong = (prediction_error(predict(model, log, 30, session_time=t), log) for t in (30.0, 0.0))
+    found = (predict(model, log, 30, stride=20, session_time=t) for t in (30.0, 0.0))
+    right, wrong = (prediction_error(each, log) for each in found)
     assert right["position_rms"] < 1e-3
     assert wrong["position_rms"] > 5e-3
