@@ -160,14 +160,16 @@ def length_after(search: Search, there: Point, local: Local) -> Array:
     return jnp.where(told > expected, jnp.maximum(expected / told, SHORTEST), 1.0)
 
 
-def adapt(search: Search, better: Array) -> Search:
-    """Less damping of what moved and did well, more of what moved and did not. A whole step that fails stiffens all;
-    from the second in a row on the dead zones alone, for it is they that are at a kink."""
+def adapt(search: Search, better: Array, easily: Array) -> Search:
+    """Less damping of what moved and did `easily`: better, and without a curvature that asks for shorter steps. More of
+    what moved and did not do better. A whole step that fails stiffens all; from the second in a row on the dead zones
+    alone, for it is they that are at a kink."""
     others, failures = search.damping.others, search.failures
     failed = ~better & ~search.holding
     stiffer = (~better & search.holding) | (failed & (failures == 0))
-    others = jnp.maximum(others * jnp.where(better, EASE, jnp.where(stiffer, STIFFEN, 1.0)), LEAST_DAMPING)
-    dead_zones = search.damping.dead_zones * jnp.where(search.holding, 1.0, jnp.where(better, EASE, STIFFEN))
+    others = jnp.maximum(others * jnp.where(easily, EASE, jnp.where(stiffer, STIFFEN, 1.0)), LEAST_DAMPING)
+    stays = search.holding | (better & ~easily)
+    dead_zones = search.damping.dead_zones * jnp.where(stays, 1.0, jnp.where(better, EASE, STIFFEN))
     failures = jnp.where(search.holding, failures, jnp.where(better, 0, failures + 1))
     return search._replace(damping=Damping(jnp.maximum(dead_zones, others), others), failures=failures)
 
@@ -189,9 +191,12 @@ def search_from(point: Point, runs: Runs, law: Law, d_max: Array, most: int, pri
         local = with_prior(local, there.shared, law, prior)
         better = (local.value <= search.local.value) | (search.steps == 0)
         tells = better | search.holding  # a whole step may have failed at a kink, which is no curvature
-        length = jnp.where(tells, length_after(search, there, local), 1.0)
+        half = jnp.maximum(0.5 * search.length, SHORTEST)
+        length = jnp.where(tells, length_after(search, there, local), half)
         point, local = jax.tree.map(lambda a, b: jnp.where(better, a, b), (there, local), (search.point, search.local))
-        after = adapt(search, better)._replace(point=point, local=local, steps=search.steps + 1, length=length)
+        after = adapt(search, better, better & (length == 1.0))._replace(
+            point=point, local=local, steps=search.steps + 1, length=length
+        )
         kinked = (after.failures > 1) & ~search.holding
         proposed, holding, arrived = propose(after, kinked, law, low, high)
         return after._replace(proposed=proposed, holding=holding, arrived=arrived)
