@@ -4,7 +4,6 @@ import re
 
 import numpy as np
 import pytest
-from support import in_process
 from support.bags import BEGIN, FORMATS, Bag, name_of
 from support.program import jaxident, refused
 
@@ -177,16 +176,16 @@ def test_a_finished_log_is_mended(tmp_path, run):
     (told,) = log_suspicions(read_log(tmp_path / "late.csv"))
     advice = re.search(r"`jaxident (convert --log LOG --pose-offset \S+ --out NEW)`", told)[1]
     words = advice.replace("LOG", "late.csv").replace("NEW", "mended.csv").split()
-    assert in_process.jaxident(*words, "--period", str(PERIOD), cwd=tmp_path).code == 0
+    assert jaxident(*words, "--period", str(PERIOD), cwd=tmp_path).returncode == 0
     for one in read_log(tmp_path / "mended.csv").runs():
         np.testing.assert_array_equal(one.x[: ROWS - 4], run.x[: ROWS - 4])
         np.testing.assert_array_equal(one.u_r, run.u_r)
-    again = in_process.jaxident("convert", "--log", "mended.csv", "--out", "same.csv", cwd=tmp_path)
-    assert (again.code, again.err) == (0, "")
+    again = jaxident("convert", "--log", "mended.csv", "--out", "same.csv", cwd=tmp_path)
+    assert (again.returncode, again.stderr) == (0, "")
     assert (tmp_path / "same.csv").read_bytes() == (tmp_path / "mended.csv").read_bytes()
     auto = ("--pose-offset", "auto", "--out", "auto.csv")
-    found = in_process.jaxident("convert", "--log", "late.csv", *auto, cwd=tmp_path)
-    offset, error = map(float, re.search(r"--pose-offset (\S+) \(standard error (\S+) s", found.out).groups())
+    found = jaxident("convert", "--log", "late.csv", *auto, cwd=tmp_path)
+    offset, error = map(float, re.search(r"--pose-offset (\S+) \(standard error (\S+) s", found.stdout).groups())
     assert abs(offset + 4 * PERIOD) < 5 * error + 0.5 * PERIOD
 
 
@@ -200,13 +199,13 @@ def test_a_finished_log_is_mended(tmp_path, run):
 )
 def test_what_a_finished_log_has_no_use_for(tmp_path, run, more, told):
     late_log(tmp_path, run)
-    ended = in_process.jaxident("convert", "--log", "late.csv", *more, "--out", "x.csv", cwd=tmp_path)
-    assert (ended.code, told in ended.err) == (2, True)
+    ended = jaxident("convert", "--log", "late.csv", *more, "--out", "x.csv", cwd=tmp_path)
+    assert (ended.returncode, told in ended.stderr) == (2, True)
     assert not (tmp_path / "x.csv").exists()
 
 
 def test_an_offset_that_was_given_counts_in_the_advice(tmp_path, run):
     write_streams(tmp_path, run, late=LATE)
     words = ("convert", "--commands", "c.csv", "--poses", "p.csv", *OWN, "--track", str(TRACK), "--pose-offset", "0.1")
-    told = in_process.jaxident(*words, "--out", "log.csv", cwd=tmp_path).err
+    told = jaxident(*words, "--out", "log.csv", cwd=tmp_path).stderr
     assert abs(float(re.search(r"`jaxident convert --pose-offset (\S+)`", told)[1]) + LATE) < PERIOD

@@ -2,11 +2,10 @@
 
 import dataclasses
 import json
-import subprocess
-import sys
 
 import pytest
 from click.testing import CliRunner
+from support.program import jaxident
 
 import jaxident as ji
 from jaxident.cli.export import TARGETS, UNITS, command
@@ -21,8 +20,7 @@ def invoke(monkeypatch):
 
 
 def run(*words):
-    line = [sys.executable, "-m", "jaxident", "export", *map(str, words)]
-    return subprocess.run(line, capture_output=True, text=True, check=False, timeout=300)
+    return jaxident("export", *words)
 
 
 def test_choices_are_those_of_the_export():

@@ -1,12 +1,11 @@
 """`jaxident plan`, as a user runs it."""
 
 import json
-import subprocess
-import sys
 from functools import partial
 
 import numpy as np
 from click.testing import CliRunner
+from support.program import jaxident, refused
 
 from jaxident.cli.plan import command
 from jaxident.diagnosis.planning import next_run
@@ -33,11 +32,5 @@ def test_plan_writes_a_log_of_commands_alone(tmp_path, monkeypatch):
 
 def test_plan_refuses_in_one_line(tmp_path):
     words = ["plan", "published", "--between", "motor_lag,elves", "--out", str(tmp_path / "next.csv")]
-    result = subprocess.run(
-        [sys.executable, "-m", "jaxident", *words], capture_output=True, text=True, check=False, timeout=300
-    )
-    assert result.returncode == 2
-    assert result.stdout == ""
-    assert len(result.stderr.splitlines()) == 1
-    assert "elves" in result.stderr
+    refused(jaxident(*words), "elves")
     assert not list(tmp_path.iterdir())

@@ -8,7 +8,7 @@ import shutil
 import click
 import numpy as np
 import pytest
-from support.in_process import jaxident
+from support.program import jaxident
 
 from jaxident.cli.main import COMMANDS
 from jaxident.cli.record import READ, WRITTEN
@@ -50,7 +50,7 @@ def noisy_log():
 def made(tmp_path):
     """A folder with streams in `data`, and a log made of them."""
     write_data(tmp_path / "data")
-    assert jaxident(*WORDS, cwd=tmp_path).code == 0
+    assert jaxident(*WORDS, cwd=tmp_path).returncode == 0
     return tmp_path
 
 
@@ -63,8 +63,8 @@ def edit(path, change):
 
 def rerun(folder, *words):
     ended = jaxident("rerun", "log.csv", *words, cwd=folder)
-    errors = [line for line in ended.err.splitlines() if not line.startswith("warning: ")]
-    assert len(errors) == (ended.code != 0), ended
+    errors = [line for line in ended.stderr.splitlines() if not line.startswith("warning: ")]
+    assert len(errors) == (ended.returncode != 0), ended
     return ended
 
 
@@ -83,7 +83,7 @@ def test_a_provenance_says_neither_when_nor_where(made):
     write_data(other)
     words = ("convert", "--out", str(other / "log.csv"), "--track", "0.3", "--pose-offset", "0.0",
              "--poses", str(other / "p.csv"), "--commands", str(other / "c.csv"))  # fmt: skip
-    assert jaxident(*words, cwd=made.parent).code == 0
+    assert jaxident(*words, cwd=made.parent).returncode == 0
     for name in ("log.csv", "log.csv.provenance.json"):
         assert (other / name).read_bytes() == (made / name).read_bytes()
 
@@ -91,34 +91,34 @@ def test_a_provenance_says_neither_when_nor_where(made):
 def test_it_is_made_again_to_the_bit_and_nothing_is_left(made):
     before = sorted(made.rglob("*"))
     ended = rerun(made, "--json", "told.json")
-    assert ended.code == 0
-    assert "the same to the bit: 1200 values" in ended.out
+    assert ended.returncode == 0
+    assert "the same to the bit: 1200 values" in ended.stdout
     told = json.loads((made / "told.json").read_text())
     assert (told["same"], told["differences"], told["values"]) == (True, [], 6 * ROWS)
     assert sorted(made.rglob("*")) == sorted([*before, made / "told.json"])
-    assert rerun(made, "--out", "again").code == 0
+    assert rerun(made, "--out", "again").returncode == 0
     assert (made / "again" / "log.csv").read_bytes() == (made / "log.csv").read_bytes()
 
 
 def test_inputs_that_moved_or_changed_are_told(made):
     (made / "data").rename(made / "moved")
-    assert rerun(made).code == 0, "found in the folders here"
+    assert rerun(made).returncode == 0, "found in the folders here"
     (made / "far" / "away").mkdir(parents=True)
     shutil.move(made / "moved", made / "far" / "away" / "data")
     ended = rerun(made)
-    assert ended.code == 2
-    assert "c.csv (--commands): no such file in" in ended.err
-    assert "--data FOLDER" in ended.err
-    assert rerun(made, "--data", "far/away/data").code == 0
+    assert ended.returncode == 2
+    assert "c.csv (--commands): no such file in" in ended.stderr
+    assert "--data FOLDER" in ended.stderr
+    assert rerun(made, "--data", "far/away/data").returncode == 0
     shutil.move(made / "far" / "away" / "data" / "c.csv", made)
-    assert rerun(made, "--data", "far/away/data").code == 0, "one moved, the other is here"
+    assert rerun(made, "--data", "far/away/data").returncode == 0, "one moved, the other is here"
     with open(made / "far" / "away" / "data" / "p.csv", "a") as stream:
         stream.write("99,0,0,0\n")
     ended = rerun(made, "--data", "far/away/data")
-    assert ended.code == 2
-    assert "p.csv (--poses): has changed" in ended.err
-    assert "--data FOLDER" in ended.err
-    assert rerun(made, "--data", "nowhere").code == 2
+    assert ended.returncode == 2
+    assert "p.csv (--poses): has changed" in ended.stderr
+    assert "--data FOLDER" in ended.stderr
+    assert rerun(made, "--data", "nowhere").returncode == 2
 
 
 def test_values_that_differ_are_told_by_how_much(made):
@@ -126,17 +126,17 @@ def test_values_that_differ_are_told_by_how_much(made):
     lines[3] = lines[3].replace(lines[3].split(",")[3], repr(float(lines[3].split(",")[3]) + 1e-6))
     (made / "log.csv").write_text("\n".join(lines) + "\n")
     ended = rerun(made)
-    assert (ended.code, "has changed since" in ended.err) == (2, True)
+    assert (ended.returncode, "has changed since" in ended.stderr) == (2, True)
     record = made / "log.csv.provenance.json"
     content = json.loads(record.read_text())
     content["file"]["sha256"] = hashlib.sha256((made / "log.csv").read_bytes()).hexdigest()
     content["provenance"]["versions"]["numpy"] = "1.0"
     record.write_text(json.dumps(content))
     ended = rerun(made)
-    assert ended.code == 1
-    assert "1 of 1200 values" in ended.err
-    assert "x, line 4: " in ended.out
-    assert "numpy 1.0 then" in ended.out
+    assert ended.returncode == 1
+    assert "1 of 1200 values" in ended.stderr
+    assert "x, line 4: " in ended.stdout
+    assert "numpy 1.0 then" in ended.stdout
 
 
 @pytest.mark.parametrize(
@@ -165,8 +165,8 @@ def test_what_a_stranger_wrote_is_data(made, change, told):
     edit(made / "log.csv.provenance.json", change)
     before = sorted(made.rglob("*"))
     ended = rerun(made)
-    assert ended.code == 2
-    assert told in ended.err
+    assert ended.returncode == 2
+    assert told in ended.stderr
     assert sorted(made.rglob("*")) == before
 
 
@@ -179,8 +179,8 @@ def test_files_without_provenance_and_bad_folders_are_refused(made):
         (("log.csv", "--out", "."), "is the folder of log.csv"),
     ):
         ended = jaxident("rerun", *words, cwd=made)
-        assert ended.code == 2
-        assert told in ended.err
+        assert ended.returncode == 2
+        assert told in ended.stderr
 
 
 def test_every_parameter_that_names_a_file_is_known():
@@ -198,12 +198,12 @@ def test_a_model_and_its_json(tmp_path, monkeypatch):
     write_log(noisy_log(), tmp_path / "log.csv")
     words = ("identify", "log.csv", "--method", "key-term-least-squares", "--out", "model.json", "--json", "r.json")
     found = jaxident(*words, cwd=tmp_path)
-    assert found.code == 0, found
+    assert found.returncode == 0, found
     result = json.loads((tmp_path / "r.json").read_text())
     assert result["provenance"]["command"] == ["identify", "log.csv", "--method=key-term-least-squares"]
     assert result["model"]["provenance"]["inputs"] == result["provenance"]["inputs"]
     assert load_model(tmp_path / "model.json").provenance.origin.inputs[0].name == "log.csv"
     for name in ("model.json", "r.json"):
         again = jaxident("rerun", name, cwd=tmp_path)
-        assert again.code == 0, again
-        assert "the same to the bit" in again.out
+        assert again.returncode == 0, again
+        assert "the same to the bit" in again.stdout

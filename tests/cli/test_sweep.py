@@ -12,6 +12,7 @@ import time
 import numpy as np
 import pytest
 import xarray
+from support.program import jaxident
 from support.studies import SMALL, SMALL_TOML
 
 from jaxident.files.logs import read_log
@@ -22,8 +23,7 @@ WORDS = [sys.executable, "-m", "jaxident", "sweep"]
 
 
 def run(*words, cwd, code=0):
-    words = [*WORDS, *map(str, words)]
-    result = subprocess.run(words, capture_output=True, text=True, cwd=cwd, timeout=900, check=False)
+    result = jaxident("sweep", *words, cwd=cwd)
     assert result.returncode == code, result
     return result
 

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from support.in_process import jaxident
+from support.program import jaxident
 
 import jaxident as ji
 from jaxident.robot.drive import Physical
@@ -19,8 +19,8 @@ def folder(tmp_path_factory):
     ji.save_model(ji.Model(0.05, drive, np.zeros(2)), place / "model.json")
     words = "simulate model.json --excitation multilevel --samples 400 --noise 0.001,0.005 --wheel-noise 0.05"
     ended = jaxident(*words.split(), "--wheel-radius", "0.08", "--out", "log.csv", cwd=place)
-    assert ended.code == 0, ended.err
-    assert jaxident(*words.split()[:6], "--out", "plain.csv", cwd=place).code == 0
+    assert ended.returncode == 0, ended.stderr
+    assert jaxident(*words.split()[:6], "--out", "plain.csv", cwd=place).returncode == 0
     return place
 
 
@@ -34,8 +34,8 @@ def test_wheel_speeds_are_simulated_with_the_track_of_the_gains(folder):
     assert np.std(log.wheel_l - true.wheel_l) == pytest.approx(0.05, rel=0.15)
     again = "simulate", "model.json", "--inputs", "log.csv", "--out", "plain.csv"
     ended = jaxident(*again, "--wheel-noise", "0", cwd=folder)
-    assert ended.code == 2
-    assert "wheel speeds need --wheel-radius R" in ended.err
+    assert ended.returncode == 2
+    assert "wheel speeds need --wheel-radius R" in ended.stderr
     assert ji.read_log(folder / "plain.csv").wheel_r is None
 
 
@@ -48,15 +48,15 @@ def test_three_streams_become_a_log_and_a_late_one_is_mended(folder):
     streams = ("--commands", "cmd.csv", "--poses", "pose.csv", "--wheels", "wheel.csv", "--wheels-columns")
     ended = jaxident("convert", *streams, "wheel_r=wheel_r:rad/s", "--wheels-offset", "-0.2", "--period", "0.05",
                      "--out", "made.csv", cwd=folder)  # fmt: skip
-    assert ended.code == 0, ended.err
-    assert "400 with a pose, 39" in ended.out
+    assert ended.returncode == 0, ended.stderr
+    assert "400 with a pose, 39" in ended.stdout
     made = ji.read_log(folder / "made.csv")
     both = np.isfinite(made.wheel_r)
     np.testing.assert_allclose(made.wheel_r[both], log.wheel_r[both], rtol=1e-12)
-    assert jaxident("convert", *streams, "wheel_r=wheel_r", "--out", "late.csv", cwd=folder).code == 0
+    assert jaxident("convert", *streams, "wheel_r=wheel_r", "--out", "late.csv", cwd=folder).returncode == 0
     ended = jaxident("convert", "--log", "late.csv", "--wheels-offset", "auto", "--out", "mended.csv", cwd=folder)
-    assert ended.code == 0, ended.err
-    assert float(ended.out.split("--wheels-offset ")[1].split()[0]) == pytest.approx(-0.2, abs=0.02)
+    assert ended.returncode == 0, ended.stderr
+    assert float(ended.stdout.split("--wheels-offset ")[1].split()[0]) == pytest.approx(-0.2, abs=0.02)
 
 
 @pytest.mark.parametrize(
@@ -70,8 +70,8 @@ def test_three_streams_become_a_log_and_a_late_one_is_mended(folder):
 )
 def test_wrong_use_is_one_line(folder, words, line):
     ended = jaxident("convert", *words, "--out", "no.csv", cwd=folder)
-    assert ended.code == 2
-    assert line in ended.err.replace("\n", " ")
+    assert ended.returncode == 2
+    assert line in ended.stderr.replace("\n", " ")
     assert not (folder / "no.csv").exists()
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from support.bags import BEGIN, FORMATS, Bag, name_of
-from support.in_process import jaxident
+from support.program import jaxident
 
 from jaxident.errors import InputError
 from jaxident.files.bags import read_bag
@@ -153,10 +153,10 @@ def test_a_bag_gives_the_composed_pose(bag):
 def test_the_command_says_what_it_composed_and_which_frames_there_are(bag, tmp_path):
     words = ("convert", "--bag", str(bag), "--track", "0.3", "--out", "log.csv")
     made = jaxident(*words, "--pose-frames", "map,marker", cwd=tmp_path)
-    assert made.code == 0, made
+    assert made.returncode == 0, made
     line = "marker in map from map -> odom, odom -> base_link, base_link -> marker (static), at the 151 stamps of odom"
-    assert line in made.out
-    assert "map -> odom interpolated there; 49 stamps left out" in made.out
+    assert line in made.stdout
+    assert "map -> odom interpolated there; 49 stamps left out" in made.stdout
     assert np.isfinite(read_log(tmp_path / "log.csv").x).sum() == 151
     for more, told in (
         (("--pose-frames", "map,table"), "no chain of transforms leads from 'map' to 'table'; there are base_link ->"),
@@ -166,4 +166,4 @@ def test_the_command_says_what_it_composed_and_which_frames_there_are(bag, tmp_p
         (("--pose-topic", "/tf"), "or compose them: --pose-frames"),
     ):
         ended = jaxident(*words, *more, cwd=tmp_path)
-        assert (ended.code, told in ended.err) == (2, True), ended
+        assert (ended.returncode, told in ended.stderr) == (2, True), ended

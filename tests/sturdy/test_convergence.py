@@ -7,7 +7,7 @@ import os
 import jax
 import numpy as np
 import pytest
-from support.in_process import jaxident
+from support.program import jaxident
 
 from jaxident.estimation.uncertainty.verdict import at_bound, bound_doubts, verdicts
 from jaxident.files.logs import write_log
@@ -36,22 +36,26 @@ def identified(folder, seed):
 
 def test_a_fit_that_does_not_converge_ends_with_code_1_and_writes_nothing(tmp_path):
     ended = identified(tmp_path, 3)
-    assert ended.code == 1, ended
-    assert ended.out == ""
-    assert "did not converge, and nothing is written: its search stopped after 100 steps" in ended.err.splitlines()[-1]
+    assert ended.returncode == 1, ended
+    assert ended.stdout == ""
+    assert (
+        "did not converge, and nothing is written: its search stopped after 100 steps" in ended.stderr.splitlines()[-1]
+    )
     assert os.listdir(tmp_path) == ["log.csv"]
 
 
 def test_a_number_at_a_bound_is_told_and_never_determined(tmp_path):
     ended = identified(tmp_path, 1)
-    assert ended.code == 0, ended
+    assert ended.returncode == 0, ended
     rows = {row["parameter"]: row for row in json.loads((tmp_path / "result.json").read_text())["parameters"]}
     model = load_model(tmp_path / "model.json")
     assert model.provenance.at_bound == ("dead_zone_r", "dead_zone_l")
     for name in model.provenance.at_bound:
         assert rows[name]["verdict"] in ("weak", "not determined", "from the prior")
         assert rows[name]["reason"]
-        assert rows[name]["estimate"] == 0.0 or f"{name} stands at {rows[name]['estimate']:g}, the bound" in ended.err
+        assert (
+            rows[name]["estimate"] == 0.0 or f"{name} stands at {rows[name]['estimate']:g}, the bound" in ended.stderr
+        )
 
 
 def model_at(**values: float) -> Model:

@@ -15,7 +15,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis.strategies import SearchStrategy
 from support import hostile
-from support.in_process import jaxident
+from support.program import jaxident
 
 from jaxident.errors import InputError, WorkError
 from jaxident.files.logs import read_log, write_log
@@ -119,9 +119,9 @@ def test_options(total, tmp_path):
 
     def feed(words):
         ended = jaxident(*words, cwd=tmp_path / "here")
-        assert ended.code in (0, 2), (words, ended)
-        assert "JAXIDENT_TRACEBACK" not in ended.err
-        assert "\x1b" not in ended.err
+        assert ended.returncode in (0, 2), (words, ended)
+        assert "JAXIDENT_TRACEBACK" not in ended.stderr
+        assert "\x1b" not in ended.stderr
         assert os.listdir(tmp_path) == ["here"]
         assert os.listdir(tmp_path / "here") in ([], ["out"])
 

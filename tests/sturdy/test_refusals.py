@@ -12,7 +12,7 @@ import time
 import jax
 import numpy as np
 import pytest
-from support.in_process import Ended, jaxident
+from support.program import Ended, jaxident
 
 from jaxident.errors import InputError
 from jaxident.files import atomic, table
@@ -29,12 +29,12 @@ DEVICE = "/dev/zero"
 
 def refused(ended: Ended, *words: str) -> None:
     """Exit code 2, and one line of bearable length that holds the words."""
-    assert ended.code == 2, ended
-    assert ended.out == ""
-    assert ended.err.count("\n") == 1
-    assert len(ended.err) < 1500
+    assert ended.returncode == 2, ended
+    assert ended.stdout == ""
+    assert ended.stderr.count("\n") == 1
+    assert len(ended.stderr) < 1500
     for word in words:
-        assert word in ended.err
+        assert word in ended.stderr
 
 
 @pytest.fixture
@@ -186,8 +186,8 @@ def test_an_option_beyond_all_bounds_is_named(log, words):
     named = [word for word in words if word.startswith("--") and word != "--out"]
     ended = jaxident(*words, cwd=log.parent)
     refused(ended)
-    assert any(word in ended.err for word in named)
-    assert "out.csv" not in ended.err
+    assert any(word in ended.stderr for word in named)
+    assert "out.csv" not in ended.stderr
     assert sorted(os.listdir(log.parent)) == before
 
 
@@ -232,7 +232,7 @@ def test_a_log_whose_name_is_no_text(log):
     name = b"l\xffg.csv"
     os.rename(log, os.path.join(os.fsencode(log.parent), name))
     ended = jaxident("simulate", "published", "--inputs", name, "--out", b"\xfe.csv", cwd=log.parent)
-    assert (ended.code, ended.out) == (0, "wrote \\udcfe.csv\nwrote \\udcfe.csv.provenance.json\n")
+    assert (ended.returncode, ended.stdout) == (0, "wrote \\udcfe.csv\nwrote \\udcfe.csv.provenance.json\n")
     origin = Provenance(logs=(os.fsdecode(name),))
     save_model(dataclasses.replace(load_model("published"), provenance=origin), log.parent / "m.json")
     assert os.fsencode(*load_model(log.parent / "m.json").provenance.logs) == name
@@ -289,7 +289,7 @@ def test_an_error_line_cannot_command_the_terminal(tmp_path):
     (tmp_path / "model.json").write_text(json.dumps(content))
     ended = jaxident("predict", "model.json", "x.csv", "--horizon", "5", "--out", "p.csv", cwd=tmp_path)
     refused(ended, "\\x1b[2J")
-    assert "\x1b" not in ended.err
+    assert "\x1b" not in ended.stderr
 
 
 def test_a_model_says_what_stands_at_a_bound():
