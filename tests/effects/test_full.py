@@ -134,14 +134,15 @@ def test_forward_and_reverse_derivatives_agree(point):
 def test_derivatives_at_neutral_match_differences():
     """One-sided, of second order, where the parameter may not be negative, else central; steps of 1e-5."""
     vector, h = jnp.asarray(NEUTRAL), 1e-5
-    slopes = forward(vector)
+    along = jax.jit(lambda direction: jax.jvp(score, (vector,), (direction,))[1])  # compiles faster than all at once
     for names in RATES:
         place = PLACE[names]
         parameter = next(p for p in CATALOGUE[names[0]].parameters if p.name == names[1])
         up, twice, down = (float(score(vector.at[place].add(k * h))) for k in (1, 2, -1))
         sided = parameter.least == parameter.neutral
         slope = (4 * up - twice - 3 * float(score(vector))) / (2 * h) if sided else (up - down) / (2 * h)
-        assert float(slopes[place]) == pytest.approx(slope, rel=2e-4, abs=2e-5), names
+        found = float(along(jnp.zeros_like(vector).at[place].set(1.0)))
+        assert found == pytest.approx(slope, rel=2e-4, abs=2e-5), names
 
 
 def test_effects_without_a_derivative_give_a_grid():
