@@ -12,13 +12,14 @@ import pathlib
 import jax
 import numpy as np
 
+from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.simulate import is_random, simulate
 from jaxident.errors import InputError
 from jaxident.export.split import COUPLING, DEAD_ZONE, DISCOVERED, LOST, RATE, SLIP, Part
 from jaxident.files.json_text import read_json
 from jaxident.log import Log, make_log
 from jaxident.robot.drive import Physical
-from jaxident.robot.model import Model
+from jaxident.robot.model import Effect, Model
 
 HORIZON = 1.0
 """Seconds ahead at which the two are compared, as in the account of a diagnosis."""
@@ -69,10 +70,12 @@ def _measured(model: Model, part: Part, account: dict[str, float], runner, large
 
 
 def _without(model: Model, part: Part) -> Model | None:
-    """The model without a part; None where that makes no model."""
+    """The model without a part; None where that makes no model. An effect stays, without doing anything, so that one
+    compiled program runs them all."""
     drive = model.physical
     if part.effect:
-        return dataclasses.replace(model, effects=tuple(one for one in model.effects if one.name != part.name))
+        effects = tuple(_idle(one) if one.name == part.name else one for one in model.effects)
+        return dataclasses.replace(model, effects=effects)
     if part.name == DISCOVERED:
         return dataclasses.replace(model, discovered=())
     if part.name == DEAD_ZONE:
@@ -83,6 +86,10 @@ def _without(model: Model, part: Part) -> Model | None:
         scaled = (None if one is None else AT_ONCE * np.asarray(one) for one in drive)
         return dataclasses.replace(model, dynamics=Physical(*scaled))
     return None
+
+
+def _idle(effect: Effect) -> Effect:
+    return Effect(effect.name, {one.name: one.neutral for one in CATALOGUE[effect.name].parameters})
 
 
 def _run(model: Model, largest: float) -> np.ndarray:
