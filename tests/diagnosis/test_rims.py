@@ -166,6 +166,7 @@ def test_logs_without_the_columns_have_no_rims():
     assert Data(windows, None).of_rims(linear.rims, residual=True) is None
 
 
+@pytest.mark.slow
 def test_a_search_uses_wheel_speeds_and_sets_those_aside_that_contradict_the_poses():
     robot = dataclasses.replace(ji.load_model("published"), effects=(ji.Effect("motor_lag", {"time_constant": 0.08}),),
                                 noise=Noise(0.001, 0.005), wheels=WheelSensor(0.03, 0.1, 0.1))  # fmt: skip

@@ -79,7 +79,7 @@ def test_memory_without_gaps_is_the_general_one():
     )
 
 
-@pytest.mark.parametrize("missing", [0.0, 0.3])
+@pytest.mark.parametrize("missing", [pytest.param(0.0, marks=pytest.mark.slow), 0.3])
 def test_step_row_by_row_equals_the_scan(missing):
     log = record(samples=300, noise=1e-5, missing=missing)
     state = recursive.init(log.rows(0, 220), d_max=0.9)

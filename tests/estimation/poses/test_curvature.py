@@ -39,7 +39,13 @@ def example(law):
     return Point(to_vector(robot, law), 0.01 * jnp.ones((2, 5))), jax.tree.map(jnp.asarray, runs)
 
 
-@pytest.mark.parametrize("law", [*NOISE_LAWS.values(), Law(wheels=True), Law(slip=True, wheels=True)])
+ALL_LAWS = [*NOISE_LAWS.values(), Law(wheels=True), Law(slip=True, wheels=True)]
+QUICK_LAWS = ALL_LAWS[0], ALL_LAWS[-1]
+
+
+@pytest.mark.parametrize(
+    "law", [pytest.param(law, marks=[pytest.mark.slow] * (law not in QUICK_LAWS)) for law in ALL_LAWS]
+)
 def test_best_deviations_are_where_the_slope_by_them_is_zero(law):
     point, runs = example(law)
     best, local = jax.jit(partial(local_at_best_deviations, law=law))(point, runs)

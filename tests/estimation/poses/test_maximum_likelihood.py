@@ -160,9 +160,9 @@ def test_a_long_run_is_found_in_few_steps():
 @pytest.mark.parametrize(
     ("effect", "noise_law"),
     [
-        (Effect("lateral_slip", {"slip": 0.03}), "slip"),
+        pytest.param(Effect("lateral_slip", {"slip": 0.03}), "slip", marks=pytest.mark.slow),
         (Effect("lateral_slip", {"slip": 0.2}), "slip-ar1"),
-        (Effect("motor_lag", {"time_constant": 0.1}), "slip-ar1"),
+        pytest.param(Effect("motor_lag", {"time_constant": 0.1}), "slip-ar1", marks=pytest.mark.slow),
     ],
 )
 def test_a_law_that_is_wrong_arrives_in_few_steps(effect, noise_law):
