@@ -183,7 +183,8 @@ def with_prior(local: Local, shared: Unknowns, law: Law, prior: Prior, sign: flo
 
 def search_from(point: Point, runs: Runs, law: Law, d_max: Array, most: int, prior: Prior) -> Search:
     """Walk downhill from a point until a step promises less than TOLERANCE, at most `most` steps; values and curvatures
-    are those of poses and prior. After a whole step that failed, half of the next one is walked."""
+    are those of poses and prior. Each whole step that fails halves the part of the
+    next one that is walked, down to SHORTEST."""
     low, high = bounds(law, d_max)
 
     def body(search):
