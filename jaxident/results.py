@@ -26,7 +26,7 @@ from jaxident.report.diagnosis import diagnosis_page
 from jaxident.report.identification import COLUMNS, draw_fit, with_words, write_identification
 from jaxident.report.lead import lead
 from jaxident.report.page import Figure, Table, fragment, write_page
-from jaxident.report.words import about
+from jaxident.report.parameters import told
 
 
 class Identification(identifying.Identification):
@@ -44,7 +44,7 @@ class Identification(identifying.Identification):
         return verdicts(self.model, max(float(np.max(np.abs(u))) for log in self.logs for u in log.command))
 
     def __repr__(self) -> str:
-        rows = [(name, *told[:2], about(name)[1], *told[2:]) for name, *told in (row.cells() for row in self.verdicts)]
+        rows = [(one.name, one.estimate, one.interval, one.unit, one.verdict) for one in map(told, self.verdicts)]
         return "\n".join([_counted(self), *_aligned(rows), *self.suspicions])
 
     def _repr_html_(self) -> str:

@@ -174,13 +174,13 @@ def _as_dict(again) -> dict:
 
 def _say(found, rows, method: str, again) -> None:
     """Print the parameters and what their intervals mean."""
-    from jaxident.estimation.bootstrap import describe, interval_cells
-    from jaxident.report.words import about
+    from jaxident.estimation.bootstrap import describe
+    from jaxident.report.parameters import interval, told
 
     lines: list[tuple[str, ...]] = [("parameter", "estimate", "95 % interval", "unit", "this input")]
-    lines += [(*cells[:3], about(cells[0])[1], cells[3]) for cells in (row.cells() for row in rows)]
+    lines += [(one.name, one.estimate, one.interval, one.unit, one.verdict) for one in map(told, rows)]
     if again:
-        beside = ["bootstrap", *interval_cells(again)]
+        beside = ["bootstrap", *(interval(name, *ends) for name, ends in zip(again.order, again.interval, strict=True))]
         lines = [(*line[:3], own, *line[3:]) for line, own in zip(lines, beside, strict=True)]
     click.echo(table(lines))
     click.echo(NOTES[method] + (BOTH_SENSORS if found.model.wheels is not None else ""))

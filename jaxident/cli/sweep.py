@@ -76,7 +76,7 @@ def _run_one(plan, number, out):
     from jaxident.files.logs import write_log
     from jaxident.log import make_log
     from jaxident.plot import save
-    from jaxident.report.sweep import draw_trial, trial_rows
+    from jaxident.report.trial import draw_trial, trial_rows
     from jaxident.study.engine import run_one
 
     if number >= plan.trials:

@@ -142,11 +142,6 @@ def summarise(
     return Bootstrap(order, values, ok, covariance, interval, resample, block)
 
 
-def interval_cells(found: Bootstrap) -> list[str]:
-    """The intervals as cells of a table."""
-    return [f"[{low:.6g}, {high:.6g}]" for low, high in found.interval]
-
-
 def describe(found: Bootstrap) -> str:
     """What the intervals rest on, in a sentence."""
     what = f"blocks of {found.block} residuals" if found.resample == "blocks" else "whole runs"

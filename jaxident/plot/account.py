@@ -6,7 +6,6 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from jaxident.plot import style
-from jaxident.plot.diagnosis import name_rows
 
 NOTE = 1.35
 """Room to the right of the bars [inch]: what "104 mm, −65.1 mrad" takes."""
@@ -46,6 +45,6 @@ def waterfall(
     ax.set_xlim(low, max(high, 100.0) * wide / max(wide - NOTE, 0.5 * wide))
     ax.axvline(100.0, color=style.BLACK, linewidth=style.THIN, linestyle="--")
     ax.set_xticks([tick for tick in ax.get_xticks() if low <= tick <= 100.0])
-    name_rows(ax, list(shares))
+    style.name_rows(ax, list(shares))
     ax.set_xlabel("share of the mean squared error [%]")
     return ax

@@ -42,7 +42,7 @@ def gap_levels(
         spread = None if intervals is None else np.abs(np.asarray(intervals[name], float).T - middle)
         look: dict[str, Any] = {"linestyle": "none", "marker": marker, "markersize": 5.0, "color": colour}
         ax.errorbar(middle, shift, xerr=spread, elinewidth=1.4, label=name, **look)
-    name_rows(ax, rows)
+    style.name_rows(ax, rows)
     _spread_out(ax)
     ax.set_xlabel("mean squared error at the horizon [camera variances]")
     style.legend_above(ax)
@@ -71,9 +71,10 @@ def gap_map(
     norm = PowerNorm(0.5, low, top if top > 0.0 else 1.0, clip=True)
     shown = ax.imshow(values, cmap=MAP, norm=norm, aspect="auto")
     for row, (variable, (edges, means)) in enumerate(table.items()):
+        ends = _ends(edges)
         for column, mean in enumerate(means):
             colour = style.BLACK if norm(mean) > BRIGHT else "white"
-            text = f"{_short(edges[column])} … {_short(edges[column + 1])}"
+            text = f"{ends[column]} … {ends[column + 1]}"
             ax.text(column, row, text, ha="center", va="center", color=colour, fontsize=style.TEXT - 1.5)
             if (variable, column) in marked:
                 ax.add_patch(Rectangle((column - 0.475, row - 0.42), 0.95, 0.84, **FRAME))
@@ -114,13 +115,13 @@ def ranking(
         ax.set_xscale("log")
     ax.set_xlim(left=0.8 * least)  # names stay clear of the points
     for place, (name, value, tick) in enumerate(zip(gains, values, ticks, strict=True)):
-        text, end = (notes or {}).get(name, ""), max(value, ax.get_xlim()[0])
+        text, end = (notes or {}).get(name, ""), max(value, least)
         if 0.5 * tick < end < tick:  # clear of the tick
             end = tick
         ax.annotate(text, (end, place), (7, 0), textcoords="offset points", va="center", fontsize=style.TEXT - 1)
     low, high = ax.get_xlim()
     ax.set_xlim(low, high**1.15 if logarithmic else 1.15 * high)
-    name_rows(ax, list(gains))
+    style.name_rows(ax, list(gains))
     ax.set_xlabel("gain: fall of $-\\log p$ against the nominal model")
     style.legend_above(ax)
     return ax
@@ -147,7 +148,7 @@ def shrinks(
         ax.errorbar(middle, here, xerr=spread, elinewidth=1.4, label=group, **look)
     low, high = ax.get_xlim()
     ax.set_xlim(min(low, -8.0), max(high, 108.0))
-    name_rows(ax, list(values))
+    style.name_rows(ax, list(values))
     ax.set_xlabel("shrink of the gap [%] with 90 % interval")
     style.legend_above(ax)
     return ax
@@ -182,14 +183,6 @@ def _colour_bar(ax: Axes, shown: Any, label: str) -> None:
     bar.outline.set_linewidth(style.THIN)  # type: ignore[operator]
 
 
-def name_rows(ax: Axes, names: Sequence[str]) -> None:
-    """Rows from the top down under their names."""
-    ax.set_yticks(range(len(names)), list(names))
-    ax.set_ylim(len(names) - 0.5, -0.5)
-    ax.grid(visible=False, axis="y")
-    ax.tick_params(axis="y", length=0)
-
-
 def _spread_out(ax: Axes) -> None:
     """A logarithmic axis with plain numbers and at least a decade."""
     ax.set_xscale("log")
@@ -199,6 +192,17 @@ def _spread_out(ax: Axes) -> None:
     ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < 2.0 else (1.0,)))
     ax.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     ax.xaxis.set_minor_formatter(lambda value, _: "")
+
+
+def _ends(edges: Any) -> list[str]:
+    """Edges of a row's bins: two digits of a bin's mean width, more where two of them would look alike."""
+    edges = np.asarray(edges, float)
+    width = float(edges[-1] - edges[0]) / (len(edges) - 1)
+    decimals = 1 - int(np.floor(np.log10(width))) if width > 0.0 else 2
+    apart = len(np.unique(edges))
+    while len(np.unique(np.round(edges, decimals))) < apart:
+        decimals += 1
+    return [f"{round(edge, decimals) + 0.0:.5g}".replace("-", "\N{MINUS SIGN}") for edge in edges.tolist()]
 
 
 def _short(value: float) -> str:

@@ -1,5 +1,6 @@
 """The driven path, and how far a prediction strays from it."""
 
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -62,6 +63,35 @@ def prediction_error(step_time: Any, position_error: Any, heading_error: Any, *,
         ax.set_ylim(bottom=0.0)
         ax.set(xlabel="horizon [s]", ylabel=f"{what} error [{unit}]")
     style.legend_above_all(np.ravel(axes))
+    return axes
+
+
+def stretches(measured: Any, predicted: Mapping[str, Any], *, titles: Sequence[str], axes: Any = None) -> Any:
+    """Small multiples: measured positions (stretches, rows, 2) [m] and those that some models predict, {model:
+    (stretches, rows, 2)}, each from where it begins [mm], scales equal in x and y. Returns the axes."""
+    measured = np.asarray(measured, float)
+    columns = min(3, len(measured))
+    rows = -(-len(measured) // columns)
+    axes = style.new_axes(rows, columns, (style.WIDTH, 0.4 + 2.1 * rows)) if axes is None else axes
+    unit, scale = LENGTH
+    for number, ax in enumerate(np.ravel(axes)):
+        if number >= len(measured):
+            ax.set_visible(False)
+            continue
+        begin = measured[number, 0]
+        ax.plot(*scale * (measured[number] - begin).T, color=style.MEASURED, linestyle="none", marker=".",
+                markersize=4.0, label="measured")  # fmt: skip
+        for (name, paths), (colour, _) in zip(predicted.items(), (style.SERIES[0], style.SERIES[1]), strict=False):
+            ax.plot(*scale * (np.asarray(paths[number]) - begin).T, color=colour, linewidth=style.LINE, label=name)
+            ax.plot(*scale * (np.asarray(paths[number][-1:]) - begin).T, color=colour, marker="o", markersize=3.5)
+        ax.set_aspect("equal", adjustable="datalim")
+        ax.set_title(titles[number], loc="left", fontsize=style.TEXT - 1)
+    shown = np.ravel(axes)[: len(measured)]
+    for ax in shown[-columns:]:
+        ax.set_xlabel(f"$x$ [{unit}]")
+    for ax in shown[::columns]:
+        ax.set_ylabel(f"$y$ [{unit}]")
+    style.legend_above_all(shown)
     return axes
 
 

@@ -3,8 +3,9 @@
 from typing import NamedTuple
 
 _SYMBOLS = {"alpha": r"\alpha", "delta": r"\delta", "epsilon": r"\epsilon", "dead_zone": "D"}
+DIMENSIONLESS = "–"
 _UNITS = {
-    "alpha": ("–", 1.0),
+    "alpha": (DIMENSIONLESS, 1.0),
     "dead_zone": ("unit", 1.0),
     "delta_1": ("mm/unit", 1e3),
     "delta_2": ("mrad/unit", 1e3),

@@ -153,6 +153,43 @@ def estimate_errors(
     return ax
 
 
+def error_sizes(errors: Mapping[str, Any], *, names: Sequence[str], ax: Axes | None = None) -> Axes:
+    """Sizes of relative errors (parameters,), 1 for all, of several sources in per cent, a row per parameter, the axis
+    logarithmic. names: as in the model file."""
+    ax = style.axes_or_new(ax, (style.WIDTH, 0.8 + 0.24 * max(len(names), 2)))
+    for number, (name, values) in enumerate(errors.items()):
+        colour, marker = style.SERIES[number % len(style.SERIES)]
+        look: dict[str, Any] = {"linestyle": "none", "marker": marker, "markersize": 5.0, "color": colour}
+        ax.plot(100.0 * np.abs(np.asarray(values, float)), range(len(names)), label=name, **look)
+    ax.set(xscale="log", xlabel="size of the error [%]")
+    ax.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    style.name_rows(ax, [written(name).symbol for name in names])
+    style.legend_above(ax)
+    return ax
+
+
+def break_down(noise: Any, errors: Mapping[str, Any], *, broken: float, ax: Axes | None = None) -> Axes:
+    """Relative error, 1 for all, of each estimator's median parameter against the camera's position noise [m], the
+    middle and the range over all cells (cells, levels), both axes logarithmic; from the level `broken` on an estimator
+    is called broken."""
+    ax = style.axes_or_new(ax, (style.WIDTH, 3.0))
+    unit, scale = LENGTH
+    level = scale * np.asarray(noise, float)
+    scale_for_levels(ax, level)
+    for number, (name, values) in enumerate(errors.items()):
+        colour, marker = style.SERIES[number % len(style.SERIES)]
+        percent = 100.0 * np.asarray(values, float)
+        known = np.isfinite(percent).any(axis=0)
+        low, middle, high = np.nanquantile(percent[:, known], (0.0, 0.5, 1.0), axis=0)
+        ax.fill_between(level[known], low, high, color=colour, alpha=0.2, linewidth=0)
+        ax.plot(level[known], middle, color=colour, marker=marker, markersize=4.0, linewidth=style.LINE, label=name)
+    ax.axhline(100.0 * broken, color=style.TRUE, linewidth=style.LINE, linestyle="--", label="broken above")
+    ax.set(yscale="log", xlabel=f"camera noise in position [{unit}]", ylabel="error of the median parameter [%]")
+    ax.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    style.legend_above(ax)
+    return ax
+
+
 def _edges(errors: Sequence[np.ndarray]) -> np.ndarray:
     """Edges of the bins: all of the errors but the few outermost, and zero."""
     tail = 0.5 * (1.0 - SHOWN_SHARE)

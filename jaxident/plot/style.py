@@ -108,6 +108,14 @@ def legend_above_all(axes: Any) -> None:
     _legend(axes[0].figure, axes[0], loc="outside upper left")
 
 
+def name_rows(ax: Axes, names: Sequence[str]) -> None:
+    """Rows from the top down under their names."""
+    ax.set_yticks(range(len(names)), list(names))
+    ax.set_ylim(len(names) - 0.5, -0.5)
+    ax.grid(visible=False, axis="y")
+    ax.tick_params(axis="y", length=0)
+
+
 def heavy(points: Any) -> bool:
     """Whether a curve through these points should be drawn as pixels."""
     return np.size(points) > HEAVY

@@ -16,7 +16,7 @@ from jaxident.diagnosis.account.account import (
     Row,
 )
 from jaxident.report.page import Figure, Section, Table
-from jaxident.report.words import SPACE, angle, length, part, percent
+from jaxident.report.words import MINUS, SPACE, angle, length, part, percent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -101,7 +101,7 @@ def places_line(account: Account) -> str:
 
 def plain_text(text: str) -> str:
     """A text for terminals of any encoding."""
-    return text.replace(SPACE, " ").replace("\N{MINUS SIGN}", "-").replace("²", "^2").replace("±", "+-")
+    return text.replace(SPACE, " ").replace(MINUS, "-").replace("²", "^2").replace("±", "+-")
 
 
 def account_lines(account: Account) -> list[str]:

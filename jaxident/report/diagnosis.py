@@ -16,6 +16,7 @@ from jaxident.report.glossary import glossary
 from jaxident.report.lead import deviations, lead
 from jaxident.report.origin import origin_section
 from jaxident.report.page import Figure, Page, Section, Table
+from jaxident.report.stretches import served, worst_stretches
 from jaxident.report.words import (
     NOMINAL,
     SITES,
@@ -42,6 +43,7 @@ def diagnosis_page(found: Diagnosis, name: str, made: Origin | None = None) -> P
     """The page of one diagnosis; `name` says of what, such as the logs' folder, and `made` by which command."""
     sections = [
         account_section(found.account),
+        *worst_stretches(found),
         _gap(found),
         _where(found),
         causes.causes(found),
@@ -49,6 +51,7 @@ def diagnosis_page(found: Diagnosis, name: str, made: Origin | None = None) -> P
         causes.shrink(found),
         _parameters(found),
         causes.hidden(found),
+        served(found),
         glossary(*WORDS),
         *origin_section(made),
     ]

@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxident import plot
 from jaxident.errors import InputError
-from jaxident.estimation.bootstrap import Bootstrap, describe, interval_cells
+from jaxident.estimation.bootstrap import Bootstrap, describe
 from jaxident.estimation.identify import Identification
 from jaxident.estimation.poses.residual_tests import CHANNELS, DRAWN_LAGS, correlations, fit_percent, residual_tests
 from jaxident.estimation.poses.runs import stack_runs
@@ -18,7 +18,8 @@ from jaxident.log import Log, join
 from jaxident.report.glossary import glossary
 from jaxident.report.origin import origin_section
 from jaxident.report.page import Figure, Page, Section, Table, write_page
-from jaxident.report.words import SPACE, about
+from jaxident.report.parameters import interval, told
+from jaxident.report.words import MINUS, SPACE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,13 +47,14 @@ def _page(found: Identification, log: Log, verdicts: Sequence[Verdict], again: B
     sections = [
         Section("Parameters", [_parameters(verdicts, again), _dead_zones(found)]),
         Section("What speaks against it", _doubts(found)),
-        Section("What it explains", [_percent_table(percent), _path(found, log)]),
+        Section("What it explains", [_percent_table(percent)]),
         Section("What is left", [ABOUT_TESTS, _tests(normalised, runs), *_pictures(found, log, normalised, runs.seen)]),
     ]
-    told = found.model.provenance
+    made = found.model.provenance
     sections.append(glossary(*WORDS))
-    sections += origin_section(told.origin)
-    return Page("The robot behind the log", _lead(found, verdicts, percent), sections, f"jaxident {told.version}")
+    sections += origin_section(made.origin)
+    lead, follows = _lead(found, verdicts, percent), _next(found, verdicts)
+    return Page("The robot behind the log", lead, sections, f"jaxident {made.version}", follows, _path(found, log))
 
 
 def _lead(found: Identification, verdicts: Sequence[Verdict], percent: np.ndarray) -> str:
@@ -62,27 +64,45 @@ def _lead(found: Identification, verdicts: Sequence[Verdict], percent: np.ndarra
     worst = CHANNELS[int(np.argmin(percent))]
     ending = "" if bool(found.ok) else " The fit did not converge: do not trust these numbers."
     count = len(found.suspicions)
-    doubts = f" Suspicions: {count}, below." if count else " Nothing speaks against it."
+    speak = "One thing speaks" if count == 1 else f"{count} things speak" if count else "Nothing speaks"
     return (
-        f"{sure} of {len(verdicts)} numbers are determined{lent}; the model explains {percent.min():.4g} % of {worst} "
-        f"and more of the others.{doubts}{ending}"
+        f"The log determines {sure} of {len(verdicts)} numbers{lent}. The model explains {percent.min():.4g}{SPACE}% "
+        f"of the motion in {worst}, and more of the others. {speak} against it.{ending}"
     )
+
+
+def _next(found: Identification, verdicts: Sequence[Verdict]) -> str:
+    """What to do with this model: mend what speaks against it, learn what is loose, or predict."""
+    if not bool(found.ok):
+        return "Read what speaks against the fit, below; a longer log, or one that moves more, helps most often."
+    if found.suspicions:
+        more = len(found.suspicions) - 1
+        return f"{_doubts(found)[0]}{f' {more} more below.' if more else ''}"
+    loose = [row.parameter for row in verdicts if row.verdict != "determined"]
+    if loose:
+        return f"If you need {', '.join(loose)} more exactly, drive a run that moves more by them. {PREDICT}"
+    return PREDICT
 
 
 def _parameters(verdicts: Sequence[Verdict], again: Bootstrap | None) -> Table:
     rows = [with_words(row) for row in verdicts]
     if again is None:
         return Table(COLUMNS, rows, ABOUT_INTERVALS)
-    beside = [(*row[:4], own, *row[4:]) for row, own in zip(rows, interval_cells(again), strict=True)]
+    own = (interval(name, *ends) for name, ends in zip(again.order, again.interval, strict=True))
+    beside = [(*row[:4], _typeset(text), *row[4:]) for row, text in zip(rows, own, strict=True)]
     return Table((*COLUMNS[:4], "bootstrap 95 %", *COLUMNS[4:]), beside, f"{ABOUT_INTERVALS} {describe(again)}")
 
 
 def with_words(row: Verdict) -> tuple[str, ...]:
     """A parameter as a row of a page's table, in the order of COLUMNS."""
-    name, estimate, interval, verdict = row.cells()
-    meaning, unit = about(name)
-    told = f"{meaning} [{unit}]" if unit else meaning
-    return name, told, estimate, interval.replace(" ", SPACE), verdict
+    one = told(row)
+    meaning = f"{one.meaning} [{one.unit}]" if one.unit else one.meaning
+    return one.name, meaning, _typeset(one.estimate), _typeset(one.interval), one.verdict
+
+
+def _typeset(numbers: str) -> str:
+    """Numbers as a page shows them: a proper minus, and all on one line."""
+    return numbers.replace("-", MINUS).replace(" ", SPACE)
 
 
 def _doubts(found: Identification) -> list[str]:
@@ -108,7 +128,7 @@ def _dead_zones(found: Identification) -> Figure:
 
 
 def _path(found: Identification, log: Log) -> Figure:
-    figure, ax = plot.figure(size=(6.3, 4.6))
+    figure, ax = plot.figure(size=(4.8, 4.2))  # narrow: a phone shows all of it
     draw_fit(found, log, ax)
     return Figure(plot.image(figure), "Path", "Measured poses and the model's, run by run from one start state each.")
 
@@ -143,6 +163,9 @@ def _pictures(found: Identification, log: Log, normalised: np.ndarray, seen: np.
     ]  # fmt: skip
 
 
+PREDICT = (
+    "Predict a run that this fit has not seen (`jaxident predict`); `jaxident diagnose` tells what the model lacks."
+)
 WORDS = ("dead zone", "determined", "interval", "prior", "residual", "root mean square", "slip", "white")
 COLUMNS = ("parameter", "what it is", "estimate", "95 % interval", "this input")
 ABOUT_INTERVALS = (

@@ -2,9 +2,11 @@
 
 CSS = """
 :root { color-scheme: light dark;
-  --text: #1b1b1b; --soft: #5a5a5a; --back: #ffffff; --line: #d8d8d8; --shade: #00000030; --mark: #0072b2; }
+  --text: #1b1b1b; --soft: #5a5a5a; --back: #ffffff; --line: #d8d8d8; --shade: #00000030; --tint: #0000000d;
+  --mark: #0072b2; }
 @media (prefers-color-scheme: dark) { :root {
-  --text: #e6e6e6; --soft: #a8a8a8; --back: #17191c; --line: #3a3d42; --shade: #ffffff38; --mark: #56b4e9; } }
+  --text: #e6e6e6; --soft: #a8a8a8; --back: #17191c; --line: #3a3d42; --shade: #ffffff38; --tint: #ffffff1a;
+  --mark: #56b4e9; } }
 * { box-sizing: border-box; }
 body { margin: 0; background: var(--back); color: var(--text);
   font: 1rem/1.55 system-ui, -apple-system, "Segoe UI", Roboto, "Liberation Sans", "DejaVu Sans", sans-serif; }
@@ -18,6 +20,8 @@ figure { margin: 1.25rem 0 1.5rem; }
 figcaption { color: var(--soft); font-size: 0.9rem; margin: 0.4rem 0; }
 .wide { overflow-x: auto; }
 pre { overflow-x: auto; }
+p code, figcaption code { font: 0.9em ui-monospace, "Liberation Mono", "DejaVu Sans Mono", monospace;
+  background: var(--tint); padding: 0.05em 0.25em; border-radius: 3px; overflow-wrap: break-word; }
 .wide, pre { background: linear-gradient(to right, var(--back) 1rem, transparent 2rem) local,
     linear-gradient(to left, var(--back) 1rem, transparent 2rem) local,
     linear-gradient(to right, var(--shade), transparent 0.8rem),
@@ -32,6 +36,7 @@ table { border-collapse: collapse; font-size: 0.92rem; font-variant-numeric: tab
 th, td { text-align: left; padding: 0.3rem 1.2rem 0.3rem 0; border-bottom: 1px solid var(--line);
   vertical-align: baseline; }
 th { font-weight: 600; border-bottom: 1.5px solid var(--soft); vertical-align: bottom; }
+th[title] { cursor: help; text-decoration: underline dotted var(--soft) 1px; text-underline-offset: 0.25em; }
 td { min-width: 5.5rem; }
 .number { text-align: right; min-width: 0; }
 td.number { white-space: nowrap; }

@@ -1,7 +1,9 @@
-"""From a title, a verdict and sections to one HTML page. All text is escaped; there is no markup in it."""
+"""From a title, a verdict and sections to one HTML page. All text is escaped; the one markup in it are `back ticks`
+around what a reader types."""
 
 import base64
 import math
+import re
 import struct
 from collections.abc import Sequence
 from html import escape
@@ -11,6 +13,7 @@ import numpy as np
 
 from jaxident.files.atomic import Target, write_text
 from jaxident.report.look import CSS
+from jaxident.report.terms import HEADS
 
 NOTHING = "–"
 """What a table shows for a number that is missing."""
@@ -60,25 +63,28 @@ class Section(NamedTuple):
 
 class Page(NamedTuple):
     """A title, the verdict in a sentence, the sections and a closing line such as version and seed. next: what to do
-    now, in a sentence that stands below the verdict."""
+    now, in a sentence that stands below the verdict; picture: shows the verdict, below that."""
 
     title: str
     lead: str
     sections: Sequence[Section]
     footer: str = ""
     next: str = ""
+    picture: Figure | None = None
 
 
 def render(page: Page) -> str:
     """The page as HTML; equal pages give equal text."""
     footer = f"<footer>{escape(page.footer)}</footer>\n" if page.footer else ""
-    follows = f"<p><strong>What to do next.</strong> {escape(page.next)}</p>\n" if page.next else ""
+    follows = f"<p><strong>What to do next.</strong> {_text(page.next)}</p>\n" if page.next else ""
+    picture = "" if page.picture is None else _block(page.picture)
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{escape(page.title)}</title>\n<style>{CSS}</style>\n</head>\n<body>\n<main>\n"
-        f'<header>\n<h1>{escape(page.title)}</h1>\n<p class="lead">{escape(page.lead)}</p>\n{follows}</header>\n'
+        f'<header>\n<h1>{escape(page.title)}</h1>\n<p class="lead">{_text(page.lead)}</p>\n'
+        f"{follows}{picture}</header>\n"
         f"{''.join(_section(section) for section in page.sections)}{footer}</main>\n</body>\n</html>\n"
     )
 
@@ -110,7 +116,7 @@ def _block(block: "str | Table | Figure | Code") -> str:
         case Code():
             return _figure(f'<pre tabindex="0"><code>{escape(block.text)}</code></pre>\n{_caption(block.caption)}')
         case _:
-            return f"<p>{escape(block)}</p>\n"
+            return f"<p>{_text(block)}</p>\n"
 
 
 def _figure(content: str) -> str:
@@ -143,12 +149,19 @@ def _table(table: Table) -> str:
 
 def _cell(tag: str, text: str, right: bool) -> str:
     scope = ' scope="col"' if tag == "th" else ""
+    meaning = HEADS.get(text.replace("\N{NO-BREAK SPACE}", " ")) if tag == "th" else None
+    hover = f' title="{escape(meaning)}"' if meaning else ""
     side = ' class="number"' if right else ""
-    return f"<{tag}{scope}{side}>{escape(text)}</{tag}>"
+    return f"<{tag}{scope}{side}{hover}>{escape(text)}</{tag}>"
 
 
 def _caption(text: str) -> str:
-    return f"<figcaption>{escape(text)}</figcaption>\n" if text else ""
+    return f"<figcaption>{_text(text)}</figcaption>\n" if text else ""
+
+
+def _text(text: str) -> str:
+    """Escaped text; what stands between back ticks is what a reader types."""
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", escape(text))
 
 
 def _is_number(cell: Any) -> bool:

@@ -1,12 +1,15 @@
 """The pictures and the page of `jaxident reproduce`."""
 
 import os
+from importlib.metadata import version
 
 import numpy as np
 
 from jaxident import plot
 from jaxident.array_types import Increment
 from jaxident.files.atomic import write_bytes
+from jaxident.plot.names import DIMENSIONLESS, written
+from jaxident.report.glossary import glossary
 from jaxident.report.page import Figure, Page, Section, Table, write_page
 from jaxident.robot.model import DIFFERENCE_ORDER, difference_vector
 from jaxident.robot.path_length import path_length
@@ -32,6 +35,7 @@ def write_reproduction(result: Reproduction, folder: str) -> list[str]:
 def _figures(result: Reproduction) -> dict[str, Figure]:
     """Every picture of the page by its file name."""
     figures = {
+        "errors": _errors(table_rows(result)),
         "figure_4": _figure_4(result),
         "figure_7": _figure_7(result),
         "figure_8": _increments(result, "length", "8"),
@@ -44,6 +48,18 @@ def _figures(result: Reproduction) -> dict[str, Figure]:
     for drift in result.drifts:
         figures[f"drift_{drift.name}"] = _drift(drift)
     return figures
+
+
+def _errors(rows: list[Row]) -> Figure:
+    """How far the paper's numbers and ours lie from the truth."""
+    figure, ax = plot.figure(size=(4.8, 3.6))  # narrow: a phone shows all of it
+    errors = {
+        "the paper's": [row.paper / row.true - 1.0 for row in rows],
+        "ours": [row.ours / row.true - 1.0 for row in rows],
+    }
+    plot.error_sizes(errors, names=[row.parameter for row in rows], ax=ax)
+    return _done(figure, "Errors of the paper's numbers and of ours", "Size of the error without camera noise, in per "
+                 "cent of the true number. Further left is better.")  # fmt: skip
 
 
 def _figure_4(result: Reproduction) -> Figure:
@@ -144,7 +160,7 @@ def _page(result: Reproduction, rows: list[Row], figures: dict[str, Figure]) -> 
         f"Without noise, {closer} of {len(rows)} numbers lie closer to the truth than the paper's printed "
         "estimates; camera noise biases the method, as the curves below show."
     )
-    cells = [tuple(row) for row in rows]
+    cells = [_cells(row) for row in rows]
     table = Table(("parameter", "true", "the paper's", "ours", "standard error"), cells, TABLE_CAPTION)
     noise = [figures[f"noise_{name}"] for name in SHOWN_AGAINST_NOISE]
     return Page(
@@ -156,10 +172,26 @@ def _page(result: Reproduction, rows: list[Row], figures: dict[str, Figure]) -> 
             Section("The recursion", [figures["convergence"], figures["path"]]),
             Section("What camera noise does", [NOISE_TEXT, *noise]),
             Section("A robot that ages", [figures[f"drift_{drift.name}"] for drift in result.drifts]),
+            glossary("bias", "dead zone", "interval", "residual"),
         ],
+        f"jaxident {version('jaxident')}",
+        NEXT,
+        figures["errors"],
     )
 
 
+def _cells(row: Row) -> tuple[str, float, float, float, float]:
+    """A row of the table in units that keep its numbers short."""
+    how = written(row.parameter)
+    name = row.parameter if how.unit == DIMENSIONLESS else f"{row.parameter} [{how.unit}]"
+    true, paper, ours, deviation = (how.scale * value for value in row[1:])
+    return name, true, paper, ours, float(f"{deviation:.2g}")
+
+
+NEXT = (
+    "`jaxident identify LOG` finds the model behind a log of your own; without one, `jaxident example --out logs` "
+    "makes six."
+)
 TABLE_CAPTION = (
     "True: the paper's simplified robot. Ours: third-order robot without noise, batch on the setup time, then "
     f"recursive least squares. Standard error: of one run at {1e3 * TABLE_NOISE:g} mm of camera noise."

@@ -1,4 +1,4 @@
-"""The page of `jaxident sweep`, and the picture of one of its trials."""
+"""The page of `jaxident sweep`."""
 
 import json
 import math
@@ -9,24 +9,19 @@ import numpy as np
 import xarray
 
 from jaxident import plot
-from jaxident.array_types import Increment
 from jaxident.files.atomic import Target
-from jaxident.log import make_log
 from jaxident.plot.names import plain, written
 from jaxident.plot.studies import Curve
 from jaxident.report.glossary import glossary
 from jaxident.report.page import Figure, Page, Section, Table, write_page
+from jaxident.report.words import number
 from jaxident.robot.model import DIFFERENCE_ORDER
-from jaxident.robot.path_length import path_length
-from jaxident.study.dataset import coordinates
 from jaxident.study.design import Study
-from jaxident.study.estimators import REASONS
-from jaxident.study.statistics import BROKEN_ERROR, BROKEN_SHARE, cell_axes
-from jaxident.study.trial import Outcome, Recording
+from jaxident.study.estimators import BEST
+from jaxident.study.statistics import BROKEN_ERROR, BROKEN_SHARE, cell_axes, median_error
 
 SHOWN = ("alpha_1", "alpha_2", "delta_21", "dead_zone_r")
 HISTOGRAM_TRIALS = 10_000
-SHOWN_ROWS = 300
 LISTED = 60
 """Rows that a table of the page shows; the rest stands in summary.csv."""
 
@@ -49,7 +44,43 @@ def _page(study: Study, trials: xarray.Dataset, summary: xarray.Dataset) -> Page
     ]
     versions = ", ".join(f"{name} {found}" for name, found in json.loads(trials.attrs["versions"]).items())
     lead = f"{_finding(summary)} {_counts(study, summary)}"
-    return Page(study.name, lead, sections, f"Seed {study.seed}; {versions}.")
+    closing = f"Seed {study.seed}; {versions}."
+    return Page(study.name, lead, sections, closing, _next(study, summary), _break_down(summary))
+
+
+def _break_down(summary: xarray.Dataset) -> Figure:
+    """How the error of each estimator grows with the camera's noise, over all cells."""
+    error = median_error(summary).transpose("estimator", ..., "noise")
+    levels = summary.sizes["noise"]
+    curves = {plain(str(one)): error.sel(estimator=one).values.reshape(-1, levels) for one in error["estimator"].values}
+    figure, ax = plot.figure(size=(4.8, 3.2))  # narrow: a phone shows all of it
+    plot.break_down(summary["noise"].values, curves, broken=BROKEN_ERROR, ax=ax)
+    cells = error[0].size // levels
+    spread = f" Lines: the middle of {cells} cells; fields: from the best to the worst." if cells > 1 else ""
+    return Figure(plot.image(figure), "Error of each estimator against camera noise", f"{MEDIAN}{spread}")
+
+
+MEDIAN = "Root-mean-square error of the median parameter, in per cent of the parameter."
+
+
+def _next(study: Study, summary: xarray.Dataset) -> str:
+    """Failures first; then the estimator that this study lacks; then single trials."""
+    failed = int(summary["failures"].sum())
+    if failed:
+        return f"Find out why {failed} estimates failed: the table below counts them by reason. {SINGLE}"
+    if "rmse_over_bound" in summary and all(choice.method != BEST for choice in study.estimators):
+        times = float(summary["rmse_over_bound"].median(skipna=True))
+        if times > FAR:
+            return (
+                f"These errors are {number(times)} times the least that the logs allow (the Cramér-Rao bound; median). "
+                f'Add `method = "{BEST}"` to the study: it comes near the bound.'
+            )
+    return SINGLE
+
+
+FAR = 2.0
+"""Times the Cramér-Rao bound from which another estimator is worth a try."""
+SINGLE = "Look at single trials: `jaxident sweep STUDY.toml --trial 7 --out trial` draws one with its log."
 
 
 def _finding(summary: xarray.Dataset) -> str:
@@ -202,46 +233,3 @@ def _numbers(cell: xarray.Dataset) -> Table:
     titles = ("estimator", "noise [mm]", "parameter", "bias", "± bias", "sd", "rmse", "± rmse", "coverage")
     more = f" The first {LISTED} of {len(rows)}; all stand in summary.csv." if len(rows) > LISTED else ""
     return Table(titles, rows[:LISTED], f"± is the Monte-Carlo standard error; SI units.{more}")
-
-
-def trial_rows(study: Study, number: int, outcome: Outcome) -> list[tuple[str, ...]]:
-    """A trial as rows of text: the truth and every estimate with its standard deviation, then how each one ended."""
-    head = ("parameter", "true", *(word for one in study.estimators for word in (one.name, "sd")))
-    rows = [head]
-    for k, name in enumerate(DIFFERENCE_ORDER):
-        pairs = [(outcome.estimate[e, k], outcome.deviation[e, k]) for e in range(len(study.estimators))]
-        rows.append((name, *(f"{value:.5g}" for value in (outcome.truth[k], *(v for pair in pairs for v in pair)))))
-    endings = [word for code in outcome.reason for word in (REASONS[int(code)], "")]
-    return [*rows, ("ended", "", *endings)]
-
-
-def draw_trial(study: Study, number: int, recording: Recording, outcome: Outcome) -> Any:
-    """A figure of one trial: path, commands and increments of its first rows, errors of its estimates."""
-    period = float(recording.robot.sample_period)
-    exact, measured = (
-        make_log(period * np.arange(len(pose.x)), *recording.command, *pose)
-        for pose in (recording.exact, recording.measured)
-    )
-    figure, axes = plot.figure(4, 1, size=(6.9, 10.5), heights=(2.2, 1.0, 1.0, 1.4))
-    plot.path(measured, ax=axes[0])
-    axes[0].plot(exact.x, exact.y, color="black", linewidth=0.6, linestyle="--")
-    plot.commands(measured.rows(0, SHOWN_ROWS), ax=axes[1], dead_zone=np.asarray(recording.robot.dead_zone))
-    seen, true = (Increment(*(np.asarray(c)[:SHOWN_ROWS] for c in path_length(log.pose))) for log in (measured, exact))
-    plot.increments(exact.t[1 : len(seen.turn) + 1], seen, true, ax=axes[2], channel="turn")
-    axes[2].lines[1].set_label("without noise")
-    plot.legend_above(axes[2])
-    pairs = zip(outcome.estimate, outcome.deviation, strict=True)
-    found = {plain(choice.name): pair for choice, pair in zip(study.estimators, pairs, strict=True)}
-    plot.estimate_errors(found, truth=outcome.truth, names=DIFFERENCE_ORDER, ax=axes[3])
-    figure.suptitle(plain(_title(study, number)), x=0.01, ha="left", fontsize=9)
-    return figure
-
-
-def _title(study: Study, number: int) -> str:
-    index, entries = np.unravel_index(number, study.shape), coordinates(study)
-    at = {axis: entries[axis].values[k] for axis, k in zip(study.axes, index, strict=True)}
-    effect = f"effects {at['effect']}, " if "effect" in at else ""
-    return (
-        f"trial {number}: {at['excitation']}, {at['samples']} rows, {at['robot']}, {at['period']:.4g} s, "
-        f"amplitude {at['amplitude']:g},\n{effect}camera noise {1e3 * at['noise']:.4g} mm, seed {at['seed']}"
-    )

@@ -7,7 +7,7 @@ from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.effect import UNIT, Parameter
 from jaxident.report.page import NOTHING
 
-SPACE = "\N{NO-BREAK SPACE}"
+SPACE, MINUS = "\N{NO-BREAK SPACE}", "\N{MINUS SIGN}"
 
 EFFECTS = {name: record.words for name, record in CATALOGUE.items()}
 """Each effect of the catalogue in plain words."""
@@ -109,7 +109,7 @@ def number(value: float | None) -> str:
     """A number with three digits, whole ones in full."""
     if value is None or not isfinite(value):
         return NOTHING
-    return f"{value:{'.0f' if 1e3 <= abs(value) < 1e6 else '.3g'}}".replace("-", "\N{MINUS SIGN}")
+    return f"{value:{'.0f' if 1e3 <= abs(value) < 1e6 else '.3g'}}".replace("-", MINUS)
 
 
 def measured(value: float, deviation: float | None, unit: str = "") -> str:
@@ -121,7 +121,7 @@ def measured(value: float, deviation: float | None, unit: str = "") -> str:
     if digits > 6 or digits < 0:
         return f"{number(value)}{SPACE}±{SPACE}{number(deviation)}{behind}"
     value = round(value, digits) + 0.0  # no minus before a zero
-    return f"{value:.{digits}f}{SPACE}±{SPACE}{deviation:.{digits}f}{behind}".replace("-", "\N{MINUS SIGN}")
+    return f"{value:.{digits}f}{SPACE}±{SPACE}{deviation:.{digits}f}{behind}".replace("-", MINUS)
 
 
 PARTS = {
@@ -155,9 +155,7 @@ def error(pair: tuple[float, float]) -> str:
 
 
 def _short(value: float) -> str:
-    return f"{value:{'.0f' if abs(value) >= 99.95 else '.2g' if abs(value) < 9.95 else '.3g'}}".replace(
-        "-", "\N{MINUS SIGN}"
-    )
+    return f"{value:{'.0f' if abs(value) >= 99.95 else '.2g' if abs(value) < 9.95 else '.3g'}}".replace("-", MINUS)
 
 
 def parameters(name: str, values: Mapping[str, float], deviations: Mapping[str, float] | None = None) -> str:
@@ -180,7 +178,7 @@ def percent(share: float | None) -> str:
     """A share in whole per cent."""
     if share is None or not isfinite(share):
         return NOTHING
-    return f"{round(100.0 * share)}{SPACE}%".replace("-", "\N{MINUS SIGN}")
+    return f"{round(100.0 * share)}{SPACE}%".replace("-", MINUS)
 
 
 def chance(probability: float) -> str:

@@ -232,6 +232,8 @@ _PAPER = {
     "d_max_share": Setting(D_MAX_SHARE, _number(0.0, 0.999), "a number above 0 and below 1"),
 }
 _WHOLE = {"d_max_share": _PAPER["d_max_share"]}
+BEST = "maximum-likelihood"
+"""The method whose errors come near the Cramér-Rao bound."""
 METHODS = {
     "batch": Method(batch, _PAPER),
     "recursive": Method(
@@ -240,6 +242,6 @@ METHODS = {
     ),
     "key-term-least-squares": Method(key_terms, _WHOLE),
     "instrumental-variables": Method(instrumental, _WHOLE),
-    "maximum-likelihood": Method(likelihood, _WHOLE, alone=True),
+    BEST: Method(likelihood, _WHOLE, alone=True),
 }
 """Every estimator by name."""

@@ -124,11 +124,16 @@ def summarise(trials: xarray.Dataset, bound: xarray.DataArray | None = None) -> 
     return _named(trials, found, failures, bound)
 
 
+def median_error(summary: xarray.Dataset) -> xarray.DataArray:
+    """The median over the parameters of rmse / |truth|, 1 for all; NaN where one of them is missing."""
+    return (summary["rmse"] / np.abs(summary["truth"])).median("parameter", skipna=False)
+
+
 def breakdown(summary: xarray.Dataset) -> xarray.DataArray:
     """The lowest noise level [m] from which each estimator is broken in each cell, NaN where none of the levels
     breaks it: median over the parameters of rmse / |truth| above BROKEN_ERROR, or a share of failures above
     BROKEN_SHARE."""
-    error = (summary["rmse"] / np.abs(summary["truth"])).median("parameter", skipna=False)
+    error = median_error(summary)
     failed = summary["failures"].sum("reason") / summary.attrs["seeds"]
     broken = ~(error <= BROKEN_ERROR) | (failed > BROKEN_SHARE)
     ordered = broken.sortby("noise")

@@ -27,12 +27,18 @@ def test_gap_levels_show_models_floor_and_interval():
 def test_gap_map_writes_ranges_and_frames_what_stands_out():
     table = {"speed": (np.array([0.0, 0.1, 250.4]), np.array([-1.0, 30.0])), "x": (np.array([-1.0, 1.0]), [3.0])}
     ax = plot.gap_map(table, marked={("speed", 1)}, label="excess")
-    assert [text.get_text() for text in ax.texts] == ["0 … 0.1", "0.1 … 250", "−1 … 1"]
+    assert [text.get_text() for text in ax.texts] == ["0 … 0.1", "0.1 … 250.4", "−1 … 1"]
     frames = [patch for patch in ax.patches if isinstance(patch, Rectangle)]
     assert [frame.get_x() + 0.5 * frame.get_width() for frame in frames] == [1.0]
     assert np.ma.getmaskarray(ax.images[0].get_array())[1, 1]
     nothing = plot.gap_map({"speed": (np.array([0.0, 1.0, 2.0]), np.array([-1.0, -2.0]))}, label="excess")
     nothing.figure.draw_without_rendering()
+
+
+def test_gap_map_writes_no_digits_that_tell_nothing():
+    table = {"turn rate squared": (np.array([2.2e-6, 2.1, 9.1, 80.4]), np.ones(3))}
+    ax = plot.gap_map(table, label="excess")
+    assert [text.get_text() for text in ax.texts] == ["0 … 2", "2 … 9", "9 … 80"]
 
 
 def test_ranking_is_logarithmic_only_where_gains_span_decades():

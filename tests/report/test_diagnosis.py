@@ -12,6 +12,7 @@ from jaxident.report.account import account_lines, places_line
 from jaxident.report.causes import BESIDE
 from jaxident.report.diagnosis import diagnosis_page
 from jaxident.report.lead import lead
+from jaxident.report.stretches import SHOWN, draw_stretches, worst_starts, worst_stretches
 from jaxident.report.words import EFFECTS, LOOKS, SITES, chance, measured, number, parameters, percent, together
 
 LEADS = {
@@ -235,3 +236,32 @@ def test_what_the_judging_runs_refuse_is_told_in_a_sentence():
     told = lead(made_up("unknown")._replace(refused=("quadratic_drag", "backlash")))
     assert "Quadratic drag and backlash fit the runs for naming, but with them the model predicts" in told
     assert told.endswith("So the corrected model has not got them.")
+
+
+def test_the_worst_stretches_are_drawn_with_both_models():
+    found = made_up("effects")
+    errors = np.ones_like(found.gap.errors)
+    errors[1, 7], errors[1, 3], errors[3, 3] = 100.0, 50.0, np.nan
+    found = found._replace(gap=found.gap._replace(errors=errors))
+    assert [part.heading for part in diagnosis_page(found, "runs").sections][1] == "The worst stretches"
+    worst = worst_starts(found)
+    assert len(worst) == SHOWN
+    assert worst[0] == 7
+    assert 3 not in worst
+    axes = draw_stretches(found, worst[:1])
+    begin = float(found.prepared.log.t[len(found.prepared.log.runs()[0].t) + 7 * found.prepared.rows])
+    assert plain_spaces(axes.get_title(loc="left")) == f"run 2, {begin:.4g} s\n14.1 mm off, corrected 1.4 mm"
+    assert [line.get_label() for line in axes.lines if line.get_label()[0] != "_"] == [
+        *("measured", "nominal model", "corrected model")
+    ]
+
+
+def test_no_stretch_is_drawn_where_none_is_left():
+    found = made_up("effects")
+    nothing = np.full(found.gap.errors.shape, np.nan)
+    assert worst_stretches(found._replace(gap=found.gap._replace(errors=nothing))) == []
+
+
+def test_the_page_says_which_run_served_what():
+    (table,) = tables(section(diagnosis_page(made_up("effects"), "runs"), "Which run served what"))
+    assert [row[-2:] for row in table.rows] == [("30", "–"), ("–", "30")]

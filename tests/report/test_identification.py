@@ -39,12 +39,31 @@ def test_page_holds_parameters_doubts_tests_and_pictures(tmp_path):
     text = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert path == str(tmp_path / "page.html")
     assert "from the prior: this log" not in text
-    for words in ("1 of 2 numbers are determined;", "not determined: this input moves", "The heading is odd.", "white"):
+    for words in (
+        "The log determines 1 of 2 numbers.",
+        "not determined: this input moves",
+        "The heading is odd.",
+        "white",
+    ):
         assert words in text
     assert text.count("<img") == 4
     write_identification(found._replace(suspicions=(), ok=False), logs, VERDICTS, tmp_path / "page.html")
     text = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "Nothing speaks against it. The fit did not converge" in text
+    assert "What to do next.</strong> Read what speaks against the fit" in text
+
+
+def test_the_first_screen_says_what_to_do_next_and_shows_the_path(tmp_path):
+    found, logs = made()
+    for suspicions, rows, words in (
+        (("the heading is odd", "so is x"), VERDICTS, "The heading is odd. 1 more below."),
+        ((), VERDICTS, "If you need dead_zone_r more exactly, drive a run"),
+        ((), VERDICTS[:1], "Predict a run that this fit has not seen (<code>jaxident predict</code>)"),
+    ):
+        write_identification(found._replace(suspicions=suspicions), logs, rows, tmp_path / "page.html")
+        header = (tmp_path / "page.html").read_text(encoding="utf-8").split("</header>")[0]
+        assert f"What to do next.</strong> {words}" in header
+        assert 'alt="Path"' in header
 
 
 def test_page_shows_a_bootstraps_intervals_beside_the_likelihoods(tmp_path):
@@ -53,7 +72,7 @@ def test_page_shows_a_bootstraps_intervals_beside_the_likelihoods(tmp_path):
     again = Bootstrap(("rate_1", "dead_zone_r"), np.zeros((40, 2)), np.arange(40) > 0, np.eye(2), ends, "blocks", 17)
     write_identification(found, logs, VERDICTS, tmp_path / "page.html", again)
     text = (tmp_path / "page.html").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
-    for words in ("[0.49, 0.51]", "[0.4321, 0.5678]", "[0.1234, 0.3456]", "39 of 40 refits", "blocks of 17 residuals"):
+    for words in ("[0.490, 0.510]", "[0.432, 0.568]", "[0.12, 0.35]", "39 of 40 refits", "blocks of 17 residuals"):
         assert words in text
 
 
@@ -68,5 +87,5 @@ def test_page_names_what_comes_from_the_prior(tmp_path):
     lent = [VERDICTS[0]._replace(verdict="from the prior", reason="this log hardly tells it"), VERDICTS[1]]
     write_identification(found, logs, lent, tmp_path / "page.html")
     text = (tmp_path / "page.html").read_text(encoding="utf-8")
-    assert "0 of 2 numbers are determined, 1 come from the prior;" in text
+    assert "The log determines 0 of 2 numbers, 1 come from the prior." in text
     assert "from the prior: this log hardly tells it" in text

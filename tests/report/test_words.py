@@ -4,8 +4,9 @@ import pytest
 
 from jaxident.estimation.uncertainty.verdict import NOISE_NAMES
 from jaxident.origin import Input, Origin
-from jaxident.report.glossary import TERMS, glossary
+from jaxident.report.glossary import glossary
 from jaxident.report.origin import LETTERS, origin_section
+from jaxident.report.terms import TERMS
 from jaxident.report.words import NOMINAL, about, measured
 from jaxident.robot.model import DIFFERENCE_ORDER
 

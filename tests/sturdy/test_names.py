@@ -20,7 +20,8 @@ from jaxident.plot.names import plain
 from jaxident.report.diagnosis import diagnosis_page
 from jaxident.report.identification import write_identification
 from jaxident.report.page import render
-from jaxident.report.sweep import draw_trial, write_study
+from jaxident.report.sweep import write_study
+from jaxident.report.trial import draw_trial
 from jaxident.study.design import check_study
 from jaxident.study.engine import run_one
 from jaxident.study.statistics import summarise

@@ -24,12 +24,15 @@ from jaxident.diagnosis.preparation.pose_screening import Frames
 from jaxident.diagnosis.preparation.prepare import Prepared
 from jaxident.effects.catalogue import SITES
 from jaxident.effects.coordinates import COORDINATES, NOMINAL, free_places, neutral_vector
+from jaxident.estimation.ahead.stretches import Starts
+from jaxident.log import Log
 from jaxident.robot.drive import Physical
 from jaxident.robot.model import Discovered, Effect, Model
 
 VERDICTS = ("no_gap", "parameters", "effects", "partly", "unknown", "undecided")
 LARGEST = 2.0
-COUNT = 30
+COUNT, ROWS = 30, 30
+"""Starts, and rows of the horizon."""
 _LAW = Law(1e-3, 5e-3)
 UNIT = np.array([1e-3, 1e-3, 5e-3]) ** 2
 REPLAY = Replay(("slope", "motor_lag"), np.array([[0.99, 0.01, 0.0], [0.02, 0.98, 0.0], [0.3, 0.0, 0.7]]))
@@ -55,14 +58,27 @@ def made_up(verdict: str, *, given: bool = False) -> Diagnosis:
     model = Model(0.05, Physical(np.array([2.0, 3.0]), np.ones((2, 2)), np.zeros(2)), np.array([0.1, 0.1]))
     return Diagnosis(
         verdict, _judgement(verdict, selected),
-        Gap(1.0, *levels, 1.05, (0.8, 1.3), shrink, placebo, errors, floor, UNIT, 0),
+        Gap(1.0, *levels, 1.05, (0.8, 1.3), shrink, placebo, errors, np.zeros((2, COUNT, ROWS, 3)), floor, UNIT, 0),
         account_of(1.0, _errors(errors, selected), selected, floor, UNIT), _place(gap), selected,
         [Parameter(n, 2.0 if given else None, 2.0 + 0.1 * k, 0.06) for k, n in enumerate(NOMINAL)],
         {name: 1.7**k / 10.0 for k, name in enumerate(reversed(COORDINATES))},
         REPLAY, "Record a longer <run> & more.",
-        model, _with_effects(model, selected), shrinks, Prepared(_NOTHING, LARGEST, *[_NOTHING] * 4, 30, 1.0,
-        Frames(_NOTHING, _NOTHING), _NOTHING), _finding(selected, gap, verdict),
+        model, _with_effects(model, selected), shrinks,
+        Prepared(_log(), LARGEST, _NOTHING, _starts(1), _starts(0), _NOTHING, ROWS, 1.0,
+                 Frames(_NOTHING, _NOTHING), _NOTHING),
+        _finding(selected, gap, verdict),
     )  # fmt: skip
+
+
+def _log() -> Log:
+    """Two runs, the first of which fits and the second judges."""
+    run = np.repeat([0, 1], COUNT * ROWS + 1)
+    none = np.zeros(len(run))
+    return Log(0.05 * np.arange(len(run)), none, none, 0.001 * np.arange(len(run)), none, none, run)
+
+
+def _starts(run: int) -> Starts:
+    return Starts(np.full(COUNT, run), ROWS * np.arange(COUNT))
 
 
 def _errors(errors, selected) -> dict[frozenset[str], Any]:

@@ -28,8 +28,9 @@ class Gap(NamedTuple):
     nothing else: the model as given, refitted, with the selected effects, with the discovered laws as well; the floor
     and its 90 % interval; the shrink.
     `placebo`: the shrink of an effect that nothing speaks for. errors (models, starts, 3): of these four models, as
-    squares over the camera's variances `unit` (3,) [m^2, m^2, rad^2]; noise: the floor of each start; run_up: starts of
-    the corrected model where its filter did not converge."""
+    squares over the camera's variances `unit` (3,) [m^2, m^2, rad^2]; paths (2, starts, rows, 3): poses that the
+    refitted nominal model and the last of the four predict; noise: the floor of each start; run_up: starts of the
+    corrected model where its filter did not converge."""
 
     horizon: float
     before: float
@@ -41,6 +42,7 @@ class Gap(NamedTuple):
     shrink: Shrink
     placebo: tuple[str, Shrink] | None
     errors: Any
+    paths: Any
     noise: Floor
     unit: Any
     run_up: int
@@ -116,8 +118,8 @@ def measure(prepared: Prepared, finding: Finding, given: Model | None, common, d
     weakest, idle = placebo_of(prepared, finding, law)
     placebo = (weakest, shrink(judge_model(idle, prepared)))
     low, high = (float(q) for q in np.quantile(floor.likely, [LOW, HIGH]))
-    gap = Gap(prepared.horizon, *_levels(errors), level, (low, high), shrink(everybody), placebo, errors, floor, unit,
-              int(last.run_up.sum()))  # fmt: skip
+    gap = Gap(prepared.horizon, *_levels(errors), level, (low, high), shrink(everybody), placebo, errors,
+              np.stack([nobody.path, last.path]), floor, unit, int(last.run_up.sum()))  # fmt: skip
     moved = None
     if players and finding.unexplained <= UNEXPLAINED:
         moved = _moved(everybody, judge_model(without(bare, players), prepared), unit)

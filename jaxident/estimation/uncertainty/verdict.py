@@ -34,11 +34,6 @@ class Verdict(NamedTuple):
     verdict: str
     reason: str = ""
 
-    def cells(self) -> tuple[str, str, str, str]:
-        """The verdict as a row of a table."""
-        word = f"{self.verdict}: {self.reason}" if self.reason else self.verdict
-        return self.parameter, f"{self.estimate:.6g}", f"[{self.low:.6g}, {self.high:.6g}]", word
-
 
 def verdicts(model: Model, largest_command: float) -> list[Verdict]:
     """One verdict per entry of `model.parameter_order` that is a parameter of the robot, then the noise law's."""
