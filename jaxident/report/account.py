@@ -15,7 +15,7 @@ from jaxident.diagnosis.account.account import (
     Account,
     Row,
 )
-from jaxident.report.page import Figure, Section, Table
+from jaxident.report.page import PHONE, Figure, Section, Table
 from jaxident.report.words import MINUS, SPACE, angle, length, part, percent
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def account_section(account: Account) -> Section:
     shown = _shown(account)
     if not shown:
         return Section(heading, ["No stretch of the logs is left to judge by."])
-    figure, ax = plot.figure(size=(4.8, 0.9 + 0.28 * len(shown)))  # narrow: a phone shows all of it
+    figure, ax = plot.figure(size=(PHONE, 0.9 + 0.28 * len(shown)))
     draw_account(account, ax)
     rows = [
         (part(row.part), length(row.rms_position), angle(row.rms_heading), percent(row.share),

@@ -12,7 +12,7 @@ from jaxident.diagnosis.posterior import believable_excess, believable_slip, res
 from jaxident.diagnosis.smallest_effects import smallest_sizes
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.coordinates import ASIDE, PLACES
-from jaxident.report.page import Figure, Section, Table
+from jaxident.report.page import PHONE, Figure, Section, Table
 from jaxident.report.words import EFFECTS, chance, number, parameters, percent, plain, together
 
 SHOWN = 10
@@ -86,7 +86,7 @@ def _ranking(found: Diagnosis) -> Figure | str:
     taking = {cause.effect: cause.probability for cause in found.judgement.causes}
     names = {_entrant(each): each for each in best}
     groups = {name: _group(each, found) for name, each in names.items()}
-    figure, ax = plot.figure(size=(6.3, 1.0 + _row(names) * max(len(best), 2)))
+    figure, ax = plot.figure(size=(PHONE, 1.0 + _row(names) * max(len(best), 2)))
     plot.ranking({name: each.gain for name, each in names.items()},
                  {name: each.gain - each.evidence for name, each in names.items()},
                  notes={name: chance(taking.get(each.effect, 0.0)) for name, each in names.items()},
@@ -161,7 +161,7 @@ def shrink(found: Diagnosis) -> Section:
             rows[plain(name)] = one.value, one.interval, "placebo" if name == weak else "other effects, alone"
     if not rows:
         return Section("How far the gap shrinks", [NOTHING_TO_SHRINK])
-    figure, ax = plot.figure(size=(6.3, 1.0 + _row(rows) * max(len(rows), 2)))
+    figure, ax = plot.figure(size=(PHONE, 1.0 + _row(rows) * max(len(rows), 2)))
     plot.shrinks({n: row[0] for n, row in rows.items()}, {n: row[1] for n, row in rows.items()},
                  groups={n: row[2] for n, row in rows.items()}, ax=ax)  # fmt: skip
     return Section("How far the gap shrinks", [SHRINK, Figure(plot.image(figure), "Shrink of the gap by effect")])

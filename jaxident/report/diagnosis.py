@@ -15,7 +15,7 @@ from jaxident.report.discovered import discovered
 from jaxident.report.glossary import glossary
 from jaxident.report.lead import deviations, lead
 from jaxident.report.origin import origin_section
-from jaxident.report.page import Figure, Page, Section, Table
+from jaxident.report.page import PHONE, Figure, Page, Section, Table
 from jaxident.report.stretches import served, worst_stretches
 from jaxident.report.words import (
     NOMINAL,
@@ -72,7 +72,7 @@ def _gap(found: Diagnosis) -> Section:
         return Section("How large the gap is", ["No stretch of the logs is left to judge by."])
     floor = [gap.floor, *np.mean(gap.noise.total / gap.unit, axis=0).tolist()]
     rows = ("all channels", *CHANNELS)
-    figure, ax = plot.figure(size=(6.3, 2.9))
+    figure, ax = plot.figure(size=(PHONE, 2.9))
     plot.gap_levels(levels, floor, rows=rows, intervals=intervals, floor_interval=gap.floor_interval, ax=ax)
     picture = Figure(plot.image(figure), "Error of each model by channel, against the floor", GAP_CAPTION)
     sizes = dict(zip((*names, "floor"), (gap.rms[key] for key in RMS), strict=True))

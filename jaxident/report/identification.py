@@ -17,7 +17,7 @@ from jaxident.files.atomic import Target
 from jaxident.log import Log, join
 from jaxident.report.glossary import glossary
 from jaxident.report.origin import origin_section
-from jaxident.report.page import Figure, Page, Section, Table, write_page
+from jaxident.report.page import PHONE, Figure, Page, Section, Table, write_page
 from jaxident.report.parameters import interval, told
 from jaxident.report.words import MINUS, SPACE
 
@@ -128,7 +128,7 @@ def _dead_zones(found: Identification) -> Figure:
 
 
 def _path(found: Identification, log: Log) -> Figure:
-    figure, ax = plot.figure(size=(4.8, 4.2))  # narrow: a phone shows all of it
+    figure, ax = plot.figure(size=(PHONE, 4.2))
     draw_fit(found, log, ax)
     return Figure(plot.image(figure), "Path", "Measured poses and the model's, run by run from one start state each.")
 
@@ -154,7 +154,7 @@ def _pictures(found: Identification, log: Log, normalised: np.ndarray, seen: np.
     figure, axes = plot.figure(3, 1, share_x=True, size=(6.3, 4.2))
     plot.residuals(np.concatenate(times), np.concatenate(rows, axis=1), axes=axes)
     values = correlations(normalised, seen, range(1, 1 + min(DRAWN_LAGS, max(lengths) - 1)))
-    second, ax = plot.figure(size=(6.3, 2.8))
+    second, ax = plot.figure(size=(PHONE, 2.8))
     plot.correlation(values, int(np.sum(seen)), ax=ax)
     return [
         Figure(plot.image(figure), "Residuals against time", "Residuals over their standard deviations."),

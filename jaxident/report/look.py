@@ -30,7 +30,8 @@ details { margin: 0; }
 summary { cursor: pointer; }
 summary h2 { display: inline; border: none; margin: 0; padding: 0; }
 details > summary { border-top: 1px solid var(--line); margin: 2.5rem 0 0.75rem; padding-top: 1rem; }
-.white { background: #ffffff; border: 1px solid var(--line); border-radius: 4px; padding: 0.5rem; }
+.white { --back: #ffffff; --shade: #00000030; border: 1px solid var(--line); border-radius: 4px; padding: 0.5rem; }
+.white img { mix-blend-mode: multiply; }
 img { display: block; margin: 0 auto; max-width: 100%; height: auto; }
 table { border-collapse: collapse; font-size: 0.92rem; font-variant-numeric: tabular-nums; }
 th, td { text-align: left; padding: 0.3rem 1.2rem 0.3rem 0; border-bottom: 1px solid var(--line);

@@ -24,6 +24,9 @@ SCALE = 0.72
 NARROW = 520
 """Width on the page [px] up to which a picture's text stays readable where it is shrunk to a phone's 340."""
 
+PHONE = 4.8
+"""Width of a picture [inch] that makes it NARROW: a phone shows all of it."""
+
 # Even a page that went wrong loads nothing: the browser allows its own pictures and its own style alone.
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 

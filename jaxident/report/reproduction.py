@@ -10,7 +10,7 @@ from jaxident.array_types import Increment
 from jaxident.files.atomic import write_bytes
 from jaxident.plot.names import DIMENSIONLESS, written
 from jaxident.report.glossary import glossary
-from jaxident.report.page import Figure, Page, Section, Table, write_page
+from jaxident.report.page import PHONE, Figure, Page, Section, Table, write_page
 from jaxident.robot.model import DIFFERENCE_ORDER, difference_vector
 from jaxident.robot.path_length import path_length
 from jaxident.study.reproduction import ESTIMATORS, TABLE_NOISE, Reproduction, Row, count_closer, table_rows
@@ -52,7 +52,7 @@ def _figures(result: Reproduction) -> dict[str, Figure]:
 
 def _errors(rows: list[Row]) -> Figure:
     """How far the paper's numbers and ours lie from the truth."""
-    figure, ax = plot.figure(size=(4.8, 3.6))  # narrow: a phone shows all of it
+    figure, ax = plot.figure(size=(PHONE, 3.6))
     errors = {
         "the paper's": [row.paper / row.true - 1.0 for row in rows],
         "ours": [row.ours / row.true - 1.0 for row in rows],
@@ -127,7 +127,7 @@ def _against_noise(result: Reproduction, name: str) -> Figure:
     study = result.noise
     found, ok = np.asarray(study.estimates)[..., column], np.asarray(study.ok)
     estimates = {name: np.where(ok[:, :, k], found[:, :, k], np.nan) for k, name in enumerate(ESTIMATORS)}
-    figure, ax = plot.figure(size=(6.3, 3.8))
+    figure, ax = plot.figure(size=(PHONE, 3.4))
     plot.error_against_noise(study.levels, estimates, truth=_truth(result)[column], label=name, ax=ax)
     return _done(
         figure,
@@ -142,7 +142,7 @@ def _truth(result: Reproduction) -> np.ndarray:
 
 
 def _drift(drift) -> Figure:
-    figure, ax = plot.figure(size=(6.3, 3.2))
+    figure, ax = plot.figure(size=(PHONE, 3.0))
     plot.tracking(drift.t, drift.truth, drift.estimate, drift.deviation, label=drift.name, ax=ax)
     return _done(
         figure, f"Tracking of {drift.name}", f"An ageing robot: {drift.name} and the recursion's estimate of it."

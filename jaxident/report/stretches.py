@@ -62,7 +62,7 @@ PICTURE = (
 def _title(found: Diagnosis, number: int, begin: float, models: dict[str, Array]) -> str:
     """Run and time of a stretch, and how far each model ends from the measured position."""
     own = [length(np.sqrt(np.sum((errors[number] * found.gap.unit)[:2]))) for errors in models.values()]
-    return f"run {found.prepared.judging.run[number] + 1}, {begin:.4g} s\n{' off, corrected '.join(own)}"
+    return f"run {found.prepared.judging.run[number] + 1}, {begin:.4g} s\n{', corrected '.join(own)}"
 
 
 def served(found: Diagnosis) -> Section:

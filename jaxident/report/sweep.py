@@ -13,7 +13,7 @@ from jaxident.files.atomic import Target
 from jaxident.plot.names import plain, written
 from jaxident.plot.studies import Curve
 from jaxident.report.glossary import glossary
-from jaxident.report.page import Figure, Page, Section, Table, write_page
+from jaxident.report.page import PHONE, Figure, Page, Section, Table, write_page
 from jaxident.report.words import number
 from jaxident.robot.model import DIFFERENCE_ORDER
 from jaxident.study.design import Study
@@ -53,7 +53,7 @@ def _break_down(summary: xarray.Dataset) -> Figure:
     error = median_error(summary).transpose("estimator", ..., "noise")
     levels = summary.sizes["noise"]
     curves = {plain(str(one)): error.sel(estimator=one).values.reshape(-1, levels) for one in error["estimator"].values}
-    figure, ax = plot.figure(size=(4.8, 3.2))  # narrow: a phone shows all of it
+    figure, ax = plot.figure(size=(PHONE, 3.2))
     plot.break_down(summary["noise"].values, curves, broken=BROKEN_ERROR, ax=ax)
     cells = error[0].size // levels
     spread = f" Lines: the middle of {cells} cells; fields: from the best to the worst." if cells > 1 else ""
@@ -156,7 +156,7 @@ def _curves(summary: xarray.Dataset, at: dict[str, int], name: str) -> Figure:
     bound = None
     if "rmse_over_bound" in cell:
         bound = (cell["rmse"] / cell["rmse_over_bound"]).isel(estimator=0).values
-    figure, ax = plot.figure(size=(6.3, 3.8))
+    figure, ax = plot.figure(size=(PHONE, 3.4))
     plot.error_curves(summary["noise"].values, curves, label=name, ax=ax, bound=bound)
     return Figure(plot.image(figure), f"Error of {name} against camera noise")
 
@@ -216,7 +216,7 @@ def _histogram(study: Study, trials: xarray.Dataset, summary: xarray.Dataset, na
     if "rmse_over_bound" in summary:
         cell = summary.isel(at).sel(parameter=name)
         bound = float((cell["rmse"] / cell["rmse_over_bound"]).isel(estimator=0))
-    figure, ax = plot.figure(size=(6.3, 2.8))
+    figure, ax = plot.figure(size=(PHONE, 2.8))
     plot.error_histogram(errors, label=name, ax=ax, bound=bound)
     level = f"{1e3 * study.noise[middle]:.4g} mm"
     return Figure(plot.image(figure), f"Errors of {name}", f"Errors of {name} at {level} of camera noise.")

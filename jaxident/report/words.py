@@ -184,5 +184,5 @@ def percent(share: float | None) -> str:
 def chance(probability: float) -> str:
     """A probability in whole per cent, never quite none nor all."""
     if 0.0 < probability < 0.005:
-        return f"< 1{SPACE}%"
-    return f"> 99{SPACE}%" if 0.995 < probability < 1.0 - 1e-9 else percent(probability)
+        return f"<{SPACE}1{SPACE}%"
+    return f">{SPACE}99{SPACE}%" if 0.995 < probability < 1.0 - 1e-9 else percent(probability)

@@ -250,7 +250,7 @@ def test_the_worst_stretches_are_drawn_with_both_models():
     assert 3 not in worst
     axes = draw_stretches(found, worst[:1])
     begin = float(found.prepared.log.t[len(found.prepared.log.runs()[0].t) + 7 * found.prepared.rows])
-    assert plain_spaces(axes.get_title(loc="left")) == f"run 2, {begin:.4g} s\n14.1 mm off, corrected 1.4 mm"
+    assert plain_spaces(axes.get_title(loc="left")) == f"run 2, {begin:.4g} s\n14.1 mm, corrected 1.4 mm"
     assert [line.get_label() for line in axes.lines if line.get_label()[0] != "_"] == [
         *("measured", "nominal model", "corrected model")
     ]
