@@ -27,6 +27,8 @@ from jaxident.report.identification import COLUMNS, draw_fit, with_words, write_
 from jaxident.report.lead import lead
 from jaxident.report.page import Figure, Table, fragment, write_page
 from jaxident.report.parameters import told
+from jaxident.report.words import error as size_of
+from jaxident.report.words import plain_text
 
 
 class Identification(identifying.Identification):
@@ -147,7 +149,7 @@ class Prediction(predicting.Prediction):
         lines = [f"{error['starts']} free runs of {error['seconds']:.4g} s, {error['compared']} end at a measured pose"]
         if error["compared"]:
             told = (
-                f"{1e3 * error[f'position_{kind}']:.3g} mm and {1e3 * error[f'heading_{kind}']:.3g} mrad {word}"
+                f"{plain_text(size_of((error[f'position_{kind}'], error[f'heading_{kind}'])))} {word}"
                 for kind, word in (("rms", "root mean square"), ("median", "median"), ("expected", "expected"))
             )
             lines.append(f"error there: {', '.join(told)}")

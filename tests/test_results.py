@@ -9,6 +9,7 @@ from support.diagnoses import VERDICTS, made_up
 import jaxident as ji
 from jaxident import results
 from jaxident.effects.simulate import simulate
+from jaxident.report.words import length, plain_text
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +52,7 @@ def test_a_prediction_is_held_against_its_log(identified, log, tmp_path):
     found = ji.predict(identified.model, log, horizon=30)
     error = found.error
     assert repr(found).startswith(f"{error['starts']} free runs of 1 s")
-    assert f"{1e3 * error['position_rms']:.3g} mm" in repr(found)
+    assert plain_text(length(error["position_rms"])) in repr(found)
     frame = found.to_dataframe()
     assert len(frame) == len(found.t)
     assert frame.run.dtype.kind == "i"

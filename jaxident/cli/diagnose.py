@@ -106,9 +106,10 @@ def _title(logs) -> str:
 
 def _told(found) -> list[str]:
     """What the terminal says of a diagnosis."""
-    from jaxident.report.account import account_lines, plain_text
+    from jaxident.report.account import account_lines
     from jaxident.report.discovered import sentence
     from jaxident.report.lead import refusal
+    from jaxident.report.words import plain_text
 
     lines = account_lines(found.account)
     lines.append(f"verdict: {SENTENCE[found.verdict].format(effects=' and '.join(found.selected))}")
@@ -126,8 +127,7 @@ def _causes(found) -> list[tuple[str, ...]]:
 
 
 def _gap(found) -> str:
-    from jaxident.report.account import plain_text
-    from jaxident.report.words import error
+    from jaxident.report.words import error, plain_text
 
     gap, rms = found.gap, found.gap.rms
     rows: list[tuple[str, ...]] = [("model", "error", "camera variances")]

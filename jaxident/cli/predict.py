@@ -70,11 +70,12 @@ def command(model, log, horizon, burn_in, stride, first, last, session_time, out
 def _told(summary, robot, given: bool, known: bool) -> list[str]:
     """What the terminal says of predictions."""
     from jaxident.effects.catalogue import CATALOGUE
+    from jaxident.report.words import error, plain_text
 
     lines = [f"{summary['starts']} starts, {summary['compared']} of them with a pose after {summary['seconds']:.4g} s"]
     if summary["compared"]:
         rms, median, expected = (
-            f"{1e3 * summary[f'position_{kind}']:.3g} mm and {1e3 * summary[f'heading_{kind}']:.3g} mrad"
+            plain_text(error((summary[f"position_{kind}"], summary[f"heading_{kind}"])))
             for kind in ("rms", "median", "expected")
         )
         lines.append(f"error there: {rms} root mean square, {median} median; {expected} expected, camera error apart")

@@ -1,7 +1,8 @@
 """Pictures of logs, predictions and estimates. They compute nothing: arrays in, the axes drawn on out.
 
-Every picture takes `ax`, or makes one with pyplot where it is left out. `figure` makes axes for a file, off screen;
-`save` writes them. Names are looked up on first use, so that matplotlib is loaded only when something is drawn.
+Every picture takes `ax`, or makes one with pyplot where it is left out. `figure` makes axes for a file, off screen, and
+`save` writes them; `new_axes` makes axes of the same style that pyplot shows. Names are looked up on first use, so that
+matplotlib is loaded only when something is drawn.
 """
 
 import importlib
@@ -34,6 +35,7 @@ _HOMES = {
     "error_curves": "studies",
     "error_histogram": "studies",
     "figure": "style",
+    "new_axes": "style",
     "legend_above": "style",
     "image": "output",
     "save": "output",

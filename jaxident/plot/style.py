@@ -88,7 +88,7 @@ def axes_or_new(ax: Axes | None, size: tuple[float, float] = (WIDTH, 3.0)) -> Ax
 
 
 def new_axes(rows: int, columns: int, size: tuple[float, float], share_x: bool = False) -> Any:
-    """New axes that pyplot shows, an array of them for several rows or columns."""
+    """New axes that pyplot shows, an array of them for several rows or columns; size in inches."""
     # Outside the style: pyplot may load its backend here, and what a notebook's backend sets has to stay.
     made = pyplot.figure(figsize=size, layout="constrained", facecolor=STYLE["figure.facecolor"])
     with matplotlib.rc_context(STYLE):

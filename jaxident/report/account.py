@@ -16,7 +16,7 @@ from jaxident.diagnosis.account.account import (
     Row,
 )
 from jaxident.report.page import PHONE, Figure, Section, Table
-from jaxident.report.words import MINUS, SPACE, angle, length, part, percent
+from jaxident.report.words import SPACE, angle, length, part, percent, plain_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -97,11 +97,6 @@ def places_line(account: Account) -> str:
     """How much of the error lies before the wheel, after it, and elsewhere, in a sentence."""
     parts = [f"{percent(share)} {PLACE_WORDS[place]}" for place, share in account.places.items()]
     return f"Where the error lies: {', '.join(parts)}."
-
-
-def plain_text(text: str) -> str:
-    """A text for terminals of any encoding."""
-    return text.replace(SPACE, " ").replace(MINUS, "-").replace("²", "^2").replace("±", "+-")
 
 
 def account_lines(account: Account) -> list[str]:

@@ -154,6 +154,11 @@ def error(pair: tuple[float, float]) -> str:
     return f"{length(pair[0])} and {angle(pair[1])}"
 
 
+def plain_text(text: str) -> str:
+    """A text for terminals of any encoding."""
+    return text.replace(SPACE, " ").replace(MINUS, "-").replace("²", "^2").replace("±", "+-")
+
+
 def _short(value: float) -> str:
     return f"{value:{'.0f' if abs(value) >= 99.95 else '.2g' if abs(value) < 9.95 else '.3g'}}".replace("-", MINUS)
 
