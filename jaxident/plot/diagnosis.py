@@ -36,7 +36,7 @@ def gap_levels(
         ax.fill_betweenx([-0.42, 0.42], *floor_interval, color=style.PALE, linewidth=0, zorder=1)
     ax.vlines(np.asarray(floor, float), places - 0.42, places + 0.42, color=style.TRUE, linewidth=1.4, label="floor")
     for number, (name, values) in enumerate(levels.items()):
-        colour, marker = style.SERIES[number % len(style.SERIES)]
+        colour, marker = style.look_of(name, number)
         shift = places + 0.22 * (number - 0.5 * (len(levels) - 1))
         middle = np.asarray(values, float)
         spread = None if intervals is None else np.abs(np.asarray(intervals[name], float).T - middle)
@@ -108,7 +108,7 @@ def ranking(
     least = min(1.0, max(values.min(initial=WEAKEST), WEAKEST)) if logarithmic else 0.0
     for group in [*told, None]:
         here = [k for k, name in enumerate(gains) if groups.get(name) == group]
-        colour, marker = (style.GREY, "o") if group is None else style.SERIES[told.index(group) % len(style.SERIES)]
+        colour, marker = (style.GREY, "o") if group is None else style.look_of(group, told.index(group))
         ax.plot(np.maximum(values[here], least), places[here], linestyle="none", marker=marker, markersize=6.0,
                 color=colour, clip_on=False, label=group or "others" if here else "_")  # fmt: skip
     if logarithmic:
@@ -140,7 +140,7 @@ def shrinks(
         ax.axvline(line, color=style.TRUE, linewidth=style.THIN, linestyle="--", zorder=1)
     for number, group in enumerate(dict.fromkeys(groups.values())):
         here = [k for k, name in enumerate(values) if groups[name] == group]
-        colour, marker = style.SERIES[number % len(style.SERIES)]
+        colour, marker = style.look_of(group, number)
         names = [list(values)[k] for k in here]
         middle = 100.0 * np.array([values[name] for name in names])
         spread = np.abs(100.0 * np.array([intervals[name] for name in names]).T - middle)

@@ -81,7 +81,8 @@ def stretches(measured: Any, predicted: Mapping[str, Any], *, titles: Sequence[s
         begin = measured[number, 0]
         ax.plot(*scale * (measured[number] - begin).T, color=style.MEASURED, linestyle="none", marker=".",
                 markersize=4.0, label="measured")  # fmt: skip
-        for (name, paths), (colour, _) in zip(predicted.items(), (style.SERIES[0], style.SERIES[1]), strict=False):
+        for order, (name, paths) in enumerate(predicted.items()):
+            colour, _ = style.look_of(name, order)
             ax.plot(*scale * (np.asarray(paths[number]) - begin).T, color=colour, linewidth=style.LINE, label=name)
             ax.plot(*scale * (np.asarray(paths[number][-1:]) - begin).T, color=colour, marker="o", markersize=3.5)
         ax.set_aspect("equal", adjustable="datalim")

@@ -21,6 +21,15 @@ RIGHT, LEFT = BLUE, ORANGE
 MEASURED, MODELLED, PREDICTED, TRUE = GREY, BLUE, VERMILLION, BLACK
 SERIES = tuple(zip((BLUE, VERMILLION, GREEN, PURPLE, ORANGE), "os^Dv", strict=True))
 """Colour and marker of one curve of several."""
+MODELS = {
+    "as given": SERIES[3],
+    "nominal model": SERIES[0],
+    "parameters refitted": SERIES[0],
+    "corrected model": SERIES[1],
+    "with named effects": SERIES[1],
+    "with discovered laws": SERIES[2],
+}
+"""The same of the models of a diagnosis, alike in all its pictures."""
 
 TEXT = 9.0
 THIN, LINE = 0.6, 1.0
@@ -96,6 +105,11 @@ def new_axes(rows: int, columns: int, size: tuple[float, float], share_x: bool =
     for ax in np.ravel(axes):
         _dress(ax)
     return axes
+
+
+def look_of(name: str, number: int) -> tuple[str, str]:
+    """Colour and marker of a curve: that of a model of a diagnosis, or that of the curve's number."""
+    return MODELS.get(name, SERIES[number % len(SERIES)])
 
 
 def legend_above(ax: Axes) -> None:
