@@ -36,13 +36,16 @@ from jaxident.estimation import identify as identifying
 from jaxident.estimation import predict as predicting
 from jaxident.estimation.uncertainty import precision
 from jaxident.files.any_log import as_log, as_logs
+from jaxident.progress import UNSEEN, working
 
 Function = TypeVar("Function", bound=Callable)
 
 
-def taking(function: Function, then: Callable[..., Any] | None = None, **readers: Callable[[Any], Any]) -> Function:
+def taking(
+    doing: str, function: Function, then: Callable[..., Any] | None = None, **readers: Callable[[Any], Any]
+) -> Function:
     """The function, some of its arguments read first by `readers`; None stays None. `then` makes a result of what it
-    returns and of these arguments."""
+    returns and of these arguments. `doing`: what a notebook shows while it runs."""
     signature = inspect.signature(function)
 
     @functools.wraps(function)
@@ -51,15 +54,16 @@ def taking(function: Function, then: Callable[..., Any] | None = None, **readers
         for name, read in readers.items():
             if bound.arguments.get(name) is not None:
                 bound.arguments[name] = read(bound.arguments[name])
-        found = function(*bound.args, **bound.kwargs)
+        with working(doing, UNSEEN):
+            found = function(*bound.args, **bound.kwargs)
         return found if then is None else then(found, *(bound.arguments.get(name) for name in readers))
 
     return call  # type: ignore[return-value]
 
 
-identify = taking(identifying.identify, results.identified, logs=as_logs)
-diagnose = taking(diagnosing.diagnose, results.diagnosed, logs=as_logs, sim=as_logs)
-bootstrap = taking(resampling.bootstrap, logs=as_logs)
-predict = taking(predicting.predict, results.predicted, log=as_log)
-simulate = taking(simulating.simulate, log=as_log)
-cramer_rao = taking(precision.cramer_rao, inputs=as_logs)
+identify = taking("identifying", identifying.identify, results.identified, logs=as_logs)
+diagnose = taking("diagnosing", diagnosing.diagnose, results.diagnosed, logs=as_logs, sim=as_logs)
+bootstrap = taking("refitting", resampling.bootstrap, logs=as_logs)
+predict = taking("predicting", predicting.predict, results.predicted, log=as_log)
+simulate = taking("simulating", simulating.simulate, log=as_log)
+cramer_rao = taking("computing the bound", precision.cramer_rao, inputs=as_logs)

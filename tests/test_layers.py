@@ -10,7 +10,7 @@ import pytest
 
 PACKAGE = pathlib.Path(__file__).resolve().parents[1] / "jaxident"
 
-GROUND = ("array_types", "errors", "numerics", "origin", "rules", "columns", "log", "start", "parallel")
+GROUND = ("array_types", "errors", "numerics", "origin", "rules", "columns", "log", "start", "parallel", "progress")
 FLOORS = (
     ("ground",),
     ("robot",),

@@ -2,9 +2,9 @@
 
 import click
 
-from jaxident.cli.progress import working
 from jaxident.cli.record import Recorded, origin, with_provenance
 from jaxident.cli.session import check_outputs, json_option, seed_option, table, write_json
+from jaxident.progress import working
 from jaxident.start import start_jax
 
 

@@ -4,9 +4,9 @@ import click
 
 from jaxident.cli.advice import advising, for_speeds, warn, with_offset
 from jaxident.cli.convert_options import FRAMES, ORDER, OffsetOption
-from jaxident.cli.progress import working
 from jaxident.cli.record import Recorded, origin, tell_origin
 from jaxident.cli.session import ColumnsOption, above_zero, check_outputs, columns_option, table, wrote
+from jaxident.progress import working
 
 NEEDED = "give --commands CSV --poses CSV, or --bag PATH, or --log LOG"
 

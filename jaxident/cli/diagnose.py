@@ -6,9 +6,9 @@ import os
 import click
 
 from jaxident.cli.advice import advising, warn
-from jaxident.cli.progress import working
 from jaxident.cli.record import Recorded, origin, with_provenance
 from jaxident.cli.session import above_zero, check_outputs, columns_option, seed_option, table, write_json, wrote
+from jaxident.progress import working
 from jaxident.start import start_jax
 
 OUTPUTS = ("diagnosis.json", "nominal_model.json", "corrected_model.json", "report.html")

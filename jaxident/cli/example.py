@@ -5,9 +5,9 @@ import os
 
 import click
 
-from jaxident.cli.progress import working
 from jaxident.cli.record import Recorded, origin
 from jaxident.cli.session import check_outputs, seed_option, wrote
+from jaxident.progress import working
 from jaxident.start import start_jax
 
 OUTPUTS = (*(f"real_{number}.csv" for number in range(1, 7)), ".answer.json")

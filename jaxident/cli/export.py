@@ -2,9 +2,9 @@
 
 import click
 
-from jaxident.cli.progress import working
 from jaxident.cli.record import Recorded, origin, tell_origin, with_provenance
 from jaxident.cli.session import check_outputs, json_option, write_json, wrote
+from jaxident.progress import working
 from jaxident.start import start_jax
 
 TARGETS = ("mjcf", "gazebo", "isaac", "ros2_control", "robot_localization", "c-header", "python", "table")

@@ -5,7 +5,6 @@ import dataclasses
 import click
 
 from jaxident.cli.advice import advising, warn
-from jaxident.cli.progress import working
 from jaxident.cli.record import Recorded, origin, with_provenance
 from jaxident.cli.session import (
     Number,
@@ -19,6 +18,7 @@ from jaxident.cli.session import (
     wrote,
 )
 from jaxident.errors import WorkError
+from jaxident.progress import working
 from jaxident.start import start_jax
 
 MOST_REFITS = 100_000

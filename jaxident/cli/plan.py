@@ -2,7 +2,6 @@
 
 import click
 
-from jaxident.cli.progress import working
 from jaxident.cli.record import Recorded, origin, tell_origin, with_provenance
 from jaxident.cli.session import (
     MOST_ROWS,
@@ -14,6 +13,7 @@ from jaxident.cli.session import (
     write_json,
     wrote,
 )
+from jaxident.progress import working
 from jaxident.start import start_jax
 
 PLAIN = 9.0

@@ -2,10 +2,10 @@
 
 import click
 
-from jaxident.cli.progress import working
 from jaxident.cli.record import Recorded, origin, tell_origin, with_provenance
 from jaxident.cli.session import Number, check_outputs, columns_option, json_option, rows_option, write_json, wrote
 from jaxident.errors import WorkError
+from jaxident.progress import working
 from jaxident.start import start_jax
 
 

@@ -4,9 +4,9 @@ import os
 
 import click
 
-from jaxident.cli.progress import working
 from jaxident.cli.record import Recorded, origin, with_provenance
 from jaxident.cli.session import check_outputs, json_option, seed_option, table, write_json, wrote
+from jaxident.progress import working
 from jaxident.start import start_jax
 
 TABLE = "table.json"

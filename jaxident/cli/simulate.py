@@ -2,7 +2,6 @@
 
 import click
 
-from jaxident.cli.progress import working
 from jaxident.cli.record import Recorded, origin, tell_origin
 from jaxident.cli.session import (
     MOST_ROWS,
@@ -14,6 +13,7 @@ from jaxident.cli.session import (
     seed_option,
     wrote,
 )
+from jaxident.progress import working
 from jaxident.start import start_jax
 
 EXCITATION_NAMES = ("staircase", "multilevel", "prbs", "multisine", "chirp")

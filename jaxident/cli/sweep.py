@@ -4,9 +4,9 @@ import os
 
 import click
 
-from jaxident.cli.progress import counting, working
 from jaxident.cli.record import Recorded, origin, tell_origin
 from jaxident.cli.session import seed_option, table, wrote
+from jaxident.progress import counting, working
 from jaxident.start import start_jax
 
 

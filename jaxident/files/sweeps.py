@@ -15,6 +15,7 @@ from jaxident.files.atomic import Target
 from jaxident.files.studies import read_study, study_from_dict
 from jaxident.files.trials import finish, missing, open_trials, opened, write_chunk
 from jaxident.numerics import require_float64
+from jaxident.progress import UNSEEN, counting
 from jaxident.study.dataset import study_arrays
 from jaxident.study.design import Study, check_study
 from jaxident.study.engine import Piece, run_locally
@@ -81,9 +82,11 @@ def study(
         content = read_study(content, seed=seed)
     elif not isinstance(content, Study):
         content = study_from_dict(dict(content), seed=seed)
-    if out is None:
-        return study_arrays(content)
-    return open_trials(sweep(content, out, scheduler=scheduler))
+    with counting("trials", UNSEEN) as bar:
+        if out is None:
+            bar.begin(content.trials, 0)
+            return study_arrays(content, bar.advance)
+        return open_trials(sweep(content, out, scheduler=scheduler, told=SILENT._replace(**bar._asdict())))
 
 
 @contextlib.contextmanager

@@ -1,8 +1,9 @@
 """A study's arrays with names: axes, units, and where the numbers come from."""
 
 import json
+import math
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import jax
@@ -37,15 +38,16 @@ _MEANING: dict[str, dict[str, Any]] = {
 _UNITS = {"alpha": "1", "dead_zone": "unit", "1": "m/unit", "2": "rad/unit"}
 
 
-def study_arrays(study: Study) -> xarray.Dataset:
-    """Run a study in memory: all trials with named axes. InputError for a study that makes no sense; needs double
-    precision."""
+def study_arrays(study: Study, advance: Callable[[int], None] = lambda trials: None) -> xarray.Dataset:
+    """Run a study in memory: all trials with named axes; advance(trials) is called after each chunk. InputError for a
+    study that makes no sense; needs double precision."""
     check_study(study)
     arrays = {name: np.empty(shape, kind) for name, (shape, kind) in layout(study).items()}
     cut = chunks(study)
     for number, outcome in run_locally(study, range(len(cut))):
         for name, part in outcome._asdict().items():
             arrays[name][cut[number].cut] = part
+        advance(math.prod(cut[number].shape))
     axes = study.axes
     made = xarray.Dataset({name: (axes + FURTHER_AXES[name], array, _MEANING[name]) for name, array in arrays.items()})
     return made.assign_coords(coordinates(study).coords).assign_attrs(coordinates(study).attrs)
