@@ -10,6 +10,7 @@ from experiments.gallery.answer import HOLD, PERIOD, ROWS, Answer, picture, plai
 from jaxident.effects.apply import with_effects
 from jaxident.plot import style
 from jaxident.plot.studies import Curve
+from jaxident.report.page import PHONE
 from jaxident.robot.model import DIFFERENCE_ORDER
 
 DRIVEN = 2000
@@ -29,7 +30,7 @@ def bears_noise(seeds: int) -> Answer:
     summary = study(seeds, [1e-6, 1e-5, 1e-4, 1e-3], [{"method": name} for name in names])
     one = summary.sel(parameter="alpha_2")
     curves = {name: Curve(*(one[key].sel(estimator=name).values for key in Curve._fields)) for name in names}
-    figure, ax = ji.plot.figure(size=(6.3, 3.4))
+    figure, ax = ji.plot.figure(size=(PHONE, 3.4))
     ji.plot.error_curves(one.noise.values, curves, label="alpha_2", ax=ax)
     levels = {name: float(summary.breakdown.sel(estimator=name)) for name in names}
     told = [f"{name} from {1e3 * level:g} mm on" for name, level in levels.items() if np.isfinite(level)]
@@ -43,7 +44,7 @@ def setup_time(seeds: int) -> Answer:
     estimators = [{"method": "recursive", "name": f"{n} rows", "settings": {"setup_samples": n}} for n in rows]
     summary = study(seeds, [1e-5, 1e-4], estimators)
     error = (100 * summary.rmse / np.abs(summary.truth)).median("parameter").transpose("estimator", "noise").values
-    figure, ax = ji.plot.figure(size=(6.3, 3.0))
+    figure, ax = ji.plot.figure(size=(PHONE, 3.0))
     for column, level in enumerate(summary.noise.values):
         ax.plot(PERIOD * np.array(rows), error[:, column], "o-", label=f"{1e3 * level:g} mm of camera noise")
     ax.set(xlabel="setup time [s]", ylabel="error of the median parameter [%]", yscale="log")
@@ -59,7 +60,7 @@ def forgetting(seeds: int) -> Answer:
     """Which forgetting factor serves a robot that drifts?"""
     factors, falls = (0.9, 0.95, 0.97, 0.98, 0.99, 0.995), (0.01, 0.05, 0.2, 0.5)
     inputs = ji.excite(jax.random.key(0), "staircase", DRIVEN, PERIOD, hold=5)
-    figure, ax = ji.plot.figure(size=(6.3, 3.4))
+    figure, ax = ji.plot.figure(size=(PHONE, 3.4))
     best = []
     for fall, (colour, marker) in zip(falls, style.SERIES, strict=False):
         logs = [_drifting(inputs, fall, seed) for seed in range(max(2, seeds // 10))]

@@ -8,6 +8,7 @@ import numpy as np
 import jaxident as ji
 from experiments.gallery.answer import CAMERA, HOLD, PERIOD, ROWS, Answer, picture, plain_robot
 from jaxident.plot.names import written
+from jaxident.report.page import PHONE
 from jaxident.robot.wheel_sensor import WheelSensor
 
 NAMES = ("rate_1", "rate_2", "gain_11", "gain_12", "gain_21", "gain_22", "dead_zone_r", "dead_zone_l")
@@ -40,7 +41,7 @@ def sample_period(_: int) -> Answer:
     base = ji.excite(jax.random.key(0), "multilevel", ROWS * 2, PERIOD, hold=hold)
     errors = np.array([_bound(base[::factor]) for factor in factors])
     medians = np.median(errors, axis=1)
-    figure, ax = ji.plot.figure(size=(6.3, 3.0))
+    figure, ax = ji.plot.figure(size=(PHONE, 3.0))
     ax.plot(1 / (PERIOD * np.array(factors)), errors, color="0.8")
     ax.plot(1 / (PERIOD * np.array(factors)), medians, "o-", label="median parameter")
     ax.set(xlabel="poses a second", ylabel="least standard deviation [%]", yscale="log")

@@ -15,6 +15,7 @@ from jaxident.effects.apply import sized
 from jaxident.effects.catalogue import to_vector
 from jaxident.effects.coordinates import SEARCHED
 from jaxident.plot import style
+from jaxident.report.page import PHONE
 
 SEEN_ROWS, WINDOW = 1800, 60
 """Rows of the run in which effects are looked for, a minute, and of each of its windows, 2 s."""
@@ -36,7 +37,7 @@ def asymmetry(_: int) -> Answer:
         aside.append(float(path.y[-1]))
         turned.append(float(path.theta[-1]))
     turned = np.array(turned) - turned[0]
-    figure, ax = ji.plot.figure(size=(6.3, 3.0))
+    figure, ax = ji.plot.figure(size=(PHONE, 3.0))
     ax.plot(100 * shares, turned, "o-")
     ax.set(xlabel="left wheel weaker by [%]", ylabel="turned after 10 s [rad]")
     return Answer(f"A left wheel that is 1 % weaker turns the robot by {turned[1]:.2f} rad in 10 s of equal commands.",

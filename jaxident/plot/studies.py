@@ -92,7 +92,7 @@ def heat_map(
             colour = style.BLACK if value > 0.0 and norm(value) > BRIGHT else "white"
             text = f"{value:.0f}" if 1e2 <= value < 1e6 else f"{value:.3g}"
             ax.text(column, row, text, ha="center", va="center", color=colour, fontsize=style.TEXT - 1)
-    ax.set_xticks(range(len(columns)), columns)
+    ax.set_xticks(range(len(columns)), columns, fontsize=style.TEXT - 1)
     ax.set_yticks(range(len(rows)), rows)
     ax.set_title(label, loc="left", fontsize=style.TEXT)
     ax.grid(visible=False)
