@@ -85,19 +85,32 @@ def found(logs):
     return prepared, finding, direct
 
 
-def test_judging_runs_only_report(logs):
-    """Other poses in the run that judges, noise and nonsense, change no fit, no name, no size and no law."""
+def nonsense(logs):
+    """The logs with other poses in the run that judges."""
     rng, other = np.random.default_rng(0), list(logs)
     shape = len(logs[1].t)
     other[1] = logs[1]._replace(x=rng.normal(size=shape), y=rng.normal(size=shape), theta=rng.uniform(-3, 3, shape))
-    one, two = found(logs), found(other)
+    return other
+
+
+def test_poses_that_judge_reach_nothing_that_fits(logs):
+    one, two = prepare(logs, None), prepare(nonsense(logs), None)
+    assert set(one.judging.run) == {1}
+    for name in ("windows", "naming", "fitted", "nominal", "frames", "lost"):
+        for a, b in zip(jax.tree.leaves(getattr(one, name)), jax.tree.leaves(getattr(two, name)), strict=True):
+            np.testing.assert_array_equal(a, b, err_msg=name)
+
+
+@pytest.mark.slow
+def test_judging_runs_only_report(logs):
+    """Other poses in the run that judges, noise and nonsense, change no fit, no name, no size and no law."""
+    one, two = found(logs), found(nonsense(logs))
     assert one[1].selected == two[1].selected
     assert one[1].law == two[1].law
     assert one[2] == two[2]
     assert one[1].values == two[1].values
     np.testing.assert_array_equal(one[1].fit.vector, two[1].fit.vector)
     np.testing.assert_array_equal(one[1].table.cross, two[1].table.cross)
-    assert set(one[0].judging.run) == {1}
     np.testing.assert_array_equal(one[0].log.u_r, join(logs).u_r)  # judged under the commands that were sent
 
 

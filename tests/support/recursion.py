@@ -1,12 +1,14 @@
 """The simplified robot, its logs, and a recursion that is under way."""
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jaxident.estimation.increments import recursive
 from jaxident.estimation.increments.observations import observe_log
-from jaxident.log import Log, make_log
+from jaxident.log import Log
 from jaxident.robot.difference import Difference
 from jaxident.robot.excitation import multilevel
 from jaxident.robot.model import Model
@@ -24,15 +26,23 @@ DEAD_ZONE = jnp.array([0.25, 0.20])
 
 def record(samples=800, seed=0, noise=None, missing=0.0):
     """A log of the simplified robot as arrays."""
-    command = multilevel(jax.random.key(seed), samples, 1.0, 10)
-    log = simulate(Model(PERIOD, ROBOT, DEAD_ZONE), make_log(PERIOD * np.arange(samples), *command))
-    if noise is not None:
-        pose = observe(log.pose, Noise(noise, 10 * noise), draw_noise(jax.random.key(seed + 1), samples), PERIOD)
-        log = log._replace(x=pose.x, y=pose.y, theta=pose.theta)
+    log = Log(*_recorded(samples, seed, 0.0 if noise is None else noise))
     hidden = np.random.default_rng(seed).random(samples) < missing
-    return Log(*(jnp.asarray(c) for c in log._replace(x=jnp.where(hidden, jnp.nan, log.x))))
+    return log._replace(x=jnp.asarray(np.where(hidden, np.nan, log.x)))
 
 
+@partial(jax.jit, static_argnums=0)
+def _recorded(samples, seed, noise):
+    """The log before poses are hidden; as one program, for operations one by one take seconds to compile."""
+    command = multilevel(jax.random.key(seed), samples, 1.0, 10)
+    log = simulate(
+        Model(PERIOD, ROBOT, DEAD_ZONE), Log(PERIOD * jnp.arange(samples), *command, *jnp.zeros((4, samples)))
+    )
+    pose = observe(log.pose, Noise(noise, 10 * noise), draw_noise(jax.random.key(seed + 1), samples), PERIOD)
+    return log._replace(x=pose.x, y=pose.y, theta=pose.theta)
+
+
+@partial(jax.jit, static_argnums=1)
 def started(log, rows, difference=ROBOT, forgetting=1.0):
     """Estimate after the first rows, and the samples that follow."""
     observations = observe_log(log)

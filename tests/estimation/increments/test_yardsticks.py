@@ -69,9 +69,8 @@ def test_settings_of_other_methods_are_refused():
             identify(logged(0), "instrumental-variables", **settings)
 
 
-@pytest.mark.parametrize(
-    "method", [pytest.param(m, marks=[pytest.mark.slow] * (m != "key-term-least-squares")) for m in FITS]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("method", FITS)
 def test_batch_is_the_loop(method):
     keys = jax.random.split(jax.random.key(4), 3)
     command, pose = jax.vmap(lambda key: moved(key, 1e-5))(keys)

@@ -1,5 +1,7 @@
 """The joint filter: the plain filter where parameters are known, the bound where they are not, change, and corners."""
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -43,6 +45,7 @@ def drive_of(values):
     return Physical((values[0], values[1]), ((values[2], values[3]), (values[4], values[5])))
 
 
+@partial(jax.jit, static_argnames=("noise", "rows", "name"))
 def record(key, noise=NOISE, values=TRUTH, rows=ROWS, name="multilevel"):
     """Commands and poses (rows,) of a robot whose numbers (8,) or (8, rows) may change with time."""
     key, own = jax.random.split(key)
@@ -88,15 +91,16 @@ def test_known_parameters_make_it_the_plain_filter(memory):
     command, pose = record(jax.random.key(0), noise, rows=60)
     rows = samples(command, pose)
     state = prior(1e-9, noise=noise)
-    state, _ = step(state, jax.tree.map(lambda c: c[0], rows))
+    state, _ = jax.jit(step)(state, jax.tree.map(lambda c: c[0], rows))
     drive, pull = drive_of(TRUTH), force(drive_of(TRUTH), effective_command(command, TRUTH[6:]))
     belief = first_belief(State(*map(jnp.asarray, AT_REST)), noise)
     size = len(belief.mean)
     run = Runs(jnp.asarray(PERIOD), command, pose, jnp.ones(60, bool))
     start_belief = belief._replace(mean=state.belief.mean[:size], covariance=state.belief.covariance[:size, :size])
     blind = run._replace(seen=run.seen.at[0].set(False))
-    plain, (normalised, _) = scan_filter(hold(drive, jnp.asarray(PERIOD)), pull, start_belief, noise, blind)
-    state, (_, info) = last(state, jax.tree.map(lambda c: c[1:], rows))
+    held = hold(drive, jnp.asarray(PERIOD))
+    plain, (normalised, _) = jax.jit(scan_filter, static_argnums=3)(held, pull, start_belief, noise, blind)
+    state, (_, info) = jax.jit(last)(state, jax.tree.map(lambda c: c[1:], rows))
     np.testing.assert_allclose(np.stack(info.error, axis=1), normalised[1:], rtol=1e-5, atol=1e-5)
     np.testing.assert_allclose(state.belief.mean[:size], plain.mean, rtol=1e-5, atol=1e-7)
 
