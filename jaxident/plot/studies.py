@@ -180,7 +180,7 @@ def break_down(noise: Any, errors: Mapping[str, Any], *, broken: float, ax: Axes
         colour, marker = style.SERIES[number % len(style.SERIES)]
         percent = 100.0 * np.asarray(values, float)
         known = np.isfinite(percent).any(axis=0)
-        low, middle, high = np.nanquantile(percent[:, known], (0.0, 0.5, 1.0), axis=0)
+        low, middle, high = (np.nanquantile(percent[:, known], at, axis=0) for at in (0.0, 0.5, 1.0))
         ax.fill_between(level[known], low, high, color=colour, alpha=0.2, linewidth=0)
         ax.plot(level[known], middle, color=colour, marker=marker, markersize=4.0, linewidth=style.LINE, label=name)
     ax.axhline(100.0 * broken, color=style.TRUE, linewidth=style.LINE, linestyle="--", label="broken above")

@@ -45,7 +45,7 @@ def _page(study: Study, trials: xarray.Dataset, summary: xarray.Dataset) -> Page
     versions = ", ".join(f"{name} {found}" for name, found in json.loads(trials.attrs["versions"]).items())
     lead = f"{_finding(summary)} {_counts(study, summary)}"
     closing = f"Seed {study.seed}; {versions}."
-    return Page(study.name, lead, sections, closing, _next(study, summary), _break_down(summary))
+    return Page(study.name, lead, sections, closing, what_next(study, summary), _break_down(summary))
 
 
 def _break_down(summary: xarray.Dataset) -> Figure:
@@ -63,7 +63,7 @@ def _break_down(summary: xarray.Dataset) -> Figure:
 MEDIAN = "Root-mean-square error of the median parameter, in per cent of the parameter."
 
 
-def _next(study: Study, summary: xarray.Dataset) -> str:
+def what_next(study: Study, summary: xarray.Dataset) -> str:
     """Failures first; then the estimator that this study lacks; then single trials."""
     failed = int(summary["failures"].sum())
     if failed:
@@ -80,7 +80,7 @@ def _next(study: Study, summary: xarray.Dataset) -> str:
 
 FAR = 2.0
 """Times the Cramér-Rao bound from which another estimator is worth a try."""
-SINGLE = "Look at single trials: `jaxident sweep STUDY.toml --trial 7 --out trial` draws one with its log."
+SINGLE = "Look at single trials: `jaxident sweep STUDY.toml --trial 0 --out trial` draws one with its log."
 
 
 def _finding(summary: xarray.Dataset) -> str:

@@ -30,7 +30,7 @@ TERMS = {
 
 HEADS = {
     "position": "Root mean square error in position, in the plane of the floor.",
-    "heading": "Root mean square error in heading.",
+    "heading": "Error in heading: root mean square in mrad, or mean square in camera variances.",
     "share": "Part of the mean squared error. Shares add up to 100 %.",
     "90 % interval": "Holds the true share in 90 of 100 repetitions.",
     "all channels": "Mean squared error of along, lateral and heading together, in camera variances.",
@@ -53,7 +53,7 @@ HEADS = {
     "this input": "Whether these commands show the number: determined to a tenth, weak to a half.",
     "fit [%]": "100 (1 - residual / motion about the run's mean), both root mean square.",
     "limit": "What the number should stay below.",
-    "broken from": "The least camera noise at which the median parameter is off by more than 10 %.",
+    "broken from": "The least camera noise that breaks the estimator, by the rule above.",
     "bias": TERMS["bias"],
     "± bias": "Monte-Carlo standard error of the bias.",
     "sd": "Standard deviation of the estimates over the seeds.",

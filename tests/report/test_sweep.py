@@ -7,7 +7,7 @@ from support.studies import SMALL, UNDER_EFFECTS
 from support.trials import invented
 
 from jaxident.files.summary import write_summary
-from jaxident.report.sweep import write_study
+from jaxident.report.sweep import SINGLE, what_next, write_study
 from jaxident.study.statistics import summarise
 
 
@@ -30,23 +30,37 @@ def test_the_axis_of_effects_is_there_where_the_study_has_it(tmp_path, study, ma
     assert {row.get("effect") for row in rows} == ({"none", "payload", "late"} if maps else {None})
 
 
-def header_of(study, tmp_path, *, bound=None, broken=0):
-    """The first screen of a study's page."""
-    trials = invented(study)
-    if broken:
-        trials["reason"][{"seed": slice(0, broken)}] = 1
+def next_step(*, bound=None, broken=0):
+    """What a study's page says to do next."""
+    trials = invented(SMALL)
+    trials["reason"][{"seed": slice(0, broken)}] = 1
     summary = summarise(trials)
     if bound is not None:
         summary["rmse_over_bound"] = 0.0 * summary["rmse"] + bound
-    write_study(study, trials, summary, tmp_path / "index.html")
-    return (tmp_path / "index.html").read_text().split("</header>")[0]
+    return what_next(SMALL, summary)
 
 
-def test_the_first_screen_says_what_to_do_next_and_shows_what_breaks(tmp_path):
-    assert 'alt="Error of each estimator against camera noise"' in (header := header_of(SMALL, tmp_path))
-    assert "Look at single trials: <code>jaxident sweep STUDY.toml --trial 7" in header
-    header = header_of(SMALL, tmp_path, bound=210.0)
-    assert "210 times the least that the logs allow" in header
-    assert "<code>method = &quot;maximum-likelihood&quot;</code>" in header
-    assert "Look at single trials" in header_of(SMALL, tmp_path, bound=1.5)
-    assert "Find out why" in header_of(SMALL, tmp_path, broken=1)
+def test_what_to_do_next():
+    assert next_step() == next_step(bound=1.5) == SINGLE
+    assert next_step(bound=210.0).startswith("These errors are 210 times the least that the logs allow")
+    assert '`method = "maximum-likelihood"`' in next_step(bound=210.0)
+    assert next_step(broken=1).startswith("Find out why")
+
+
+def test_the_first_screen_shows_what_breaks(tmp_path):
+    trials = invented(SMALL)
+    write_study(SMALL, trials, summarise(trials), tmp_path / "index.html")
+    header = (tmp_path / "index.html").read_text().split("</header>")[0]
+    assert 'alt="Error of each estimator against camera noise"' in header
+    assert "Look at single trials: <code>jaxident sweep STUDY.toml --trial 0" in header
+
+
+def test_a_study_of_which_nothing_is_left_has_a_page(tmp_path):
+    """All estimates failed, at one level without noise."""
+    study = SMALL._replace(noise=(0.0,))
+    trials = invented(study)
+    trials["reason"][:] = 1
+    for name in ("estimate", "deviation"):
+        trials[name][:] = float("nan")
+    write_study(study, trials, summarise(trials), tmp_path / "index.html")
+    assert "Find out why" in (tmp_path / "index.html").read_text()
