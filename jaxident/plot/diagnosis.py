@@ -17,6 +17,8 @@ DECADES = 20.0
 """Gains whose largest is beyond this many times the smallest are drawn on a logarithmic axis."""
 FRAME: Any = {"fill": False, "edgecolor": style.VERMILLION, "linewidth": 1.8}
 """Of a bin that stands out."""
+MORE_DECIMALS = 4
+"""That the edges of a map's bins get at most, to tell them apart."""
 WEAKEST = 0.5
 """Where a logarithmic axis of gains begins at the latest: a smaller gain says nothing."""
 
@@ -199,8 +201,8 @@ def _ends(edges: Any) -> list[str]:
     edges = np.asarray(edges, float)
     width = float(edges[-1] - edges[0]) / (len(edges) - 1)
     decimals = 1 - int(np.floor(np.log10(width))) if width > 0.0 else 2
-    apart = len(np.unique(edges))
-    while len(np.unique(np.round(edges, decimals))) < apart:
+    apart, most = len(np.unique(edges)), decimals + MORE_DECIMALS
+    while decimals < most and len(np.unique(np.round(edges, decimals))) < apart:
         decimals += 1
     return [f"{round(edge, decimals) + 0.0:.5g}".replace("-", "\N{MINUS SIGN}") for edge in edges.tolist()]
 

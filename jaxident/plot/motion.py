@@ -68,7 +68,8 @@ def prediction_error(step_time: Any, position_error: Any, heading_error: Any, *,
 
 def stretches(measured: Any, predicted: Mapping[str, Any], *, titles: Sequence[str], axes: Any = None) -> Any:
     """Small multiples: measured positions (stretches, rows, 2) [m] and those that some models predict, {model:
-    (stretches, rows, 2)}, each from where it begins [mm], scales equal in x and y. Returns the axes."""
+    (stretches, rows, 2)}, each from where the first model begins [mm], scales equal in x and y; NaN where the camera
+    saw nothing. Returns the axes."""
     measured = np.asarray(measured, float)
     columns = min(3, len(measured))
     rows = -(-len(measured) // columns)
@@ -78,7 +79,7 @@ def stretches(measured: Any, predicted: Mapping[str, Any], *, titles: Sequence[s
         if number >= len(measured):
             ax.set_visible(False)
             continue
-        begin = measured[number, 0]
+        begin = np.asarray(next(iter(predicted.values())))[number, 0]
         ax.plot(*scale * (measured[number] - begin).T, color=style.MEASURED, linestyle="none", marker=".",
                 markersize=4.0, label="measured")  # fmt: skip
         for order, (name, paths) in enumerate(predicted.items()):

@@ -41,6 +41,12 @@ def test_gap_map_writes_no_digits_that_tell_nothing():
     assert [text.get_text() for text in ax.texts] == ["0 … 2", "2 … 9", "9 … 80"]
 
 
+def test_edges_that_no_digit_tells_apart_are_written_alike():
+    table = {"x": (np.array([1.0, np.nextafter(1.0, 2.0), 2.0]), np.ones(2))}
+    ax = plot.gap_map(table, label="excess")
+    assert [text.get_text() for text in ax.texts] == ["1 … 1", "1 … 2"]
+
+
 def test_ranking_is_logarithmic_only_where_gains_span_decades():
     needed, notes = {"delay": 13.0, "lag": 13.0}, {"delay": "99 %", "lag": "1 %"}
     ax = plot.ranking({"delay": 400.0, "lag": 0.0}, needed, notes=notes, groups={"delay": "selected"})

@@ -62,3 +62,13 @@ def test_prediction_error_shows_quantiles_of_the_size_where_there_are_any():
 def test_prediction_error_takes_no_predictions():
     axes = plot.prediction_error(np.array([0.1, 0.2]), np.empty((0, 2)), np.empty((0, 2)))
     assert [len(ax.lines) for ax in axes] == [0, 0]
+
+
+def test_stretches_begin_at_the_first_prediction_where_the_camera_saw_nothing():
+    measured = np.array([[[np.nan, np.nan], [1.1, 2.0], [1.2, 2.0]]])
+    path = np.array([[[1.0, 2.0], [1.1, 2.1], [1.2, 2.2]]])
+    ax = plot.stretches(measured, {"nominal model": path}, titles=["run 1"])
+    seen, line = ax.lines[0].get_xydata(), ax.lines[1].get_xydata()
+    np.testing.assert_allclose(seen[1:], [[100.0, 0.0], [200.0, 0.0]])
+    np.testing.assert_allclose(line, [[0.0, 0.0], [100.0, 100.0], [200.0, 200.0]])
+    assert ax.get_title(loc="left") == "run 1"
