@@ -1,5 +1,7 @@
 """The page of a diagnosis, of one made up for each verdict."""
 
+import functools
+
 import numpy as np
 import pytest
 from support.diagnoses import LARGEST, VERDICTS, discovered_law, finding_of, made_up
@@ -25,6 +27,12 @@ LEADS = {
 }
 
 
+@functools.cache
+def page_of(verdict: str, *, given: bool = False):
+    """The page of a diagnosis made up, whose pictures are drawn once."""
+    return diagnosis_page(made_up(verdict, given=given), "<runs>")
+
+
 def plain_spaces(text: str) -> str:
     return text.replace("\N{NO-BREAK SPACE}", " ")
 
@@ -39,7 +47,7 @@ def tables(part) -> list[Table]:
 
 @pytest.mark.parametrize("verdict", VERDICTS)
 def test_every_verdict_has_a_page(verdict):
-    page = diagnosis_page(made_up(verdict), "<runs>")
+    page = page_of(verdict)
     assert plain_spaces(page.lead).startswith(LEADS[verdict])
     html = render(page)
     assert "<runs>" not in html
@@ -124,30 +132,30 @@ def test_delay_and_drag_lie_before_the_wheel_and_slip_after_it():
 
 
 def test_replays_are_told_with_what_they_miss():
-    part = section(diagnosis_page(made_up("effects"), "runs"), "What this input could have shown")
+    part = section(page_of("effects"), "What this input could have shown")
     told = plain_spaces(" ".join(block for block in part.blocks if isinstance(block, str)))
     assert "without any effect 1 % claim one; each of 2 effects, made faint, is named in 84 % on average" in told
     assert "Named in fewer than 80 %: motor lag." in told
 
 
 def test_regions_are_in_the_users_unit():
-    (regions, sites) = tables(section(diagnosis_page(made_up("effects"), "runs"), "Where it lies"))
+    (regions, sites) = tables(section(page_of("effects"), "Where it lies"))
     assert regions.rows[0][:3] == ("right command [unit]", 0.5 * LARGEST, 1.0 * LARGEST)
     assert regions.rows[1][:3] == ("size of the speed [m/s]", 0.3, 0.9)
     assert [row[0] for row in sites.rows] == list(SITES)
 
 
 def test_what_the_effects_move_is_told_beside_what_the_nominal_model_misses():
-    told = plain_spaces(section(diagnosis_page(made_up("effects"), "runs"), "Where it lies").blocks[0])
+    told = plain_spaces(section(page_of("effects"), "Where it lies").blocks[0])
     assert "parameters refitted, 55 % is in the direction of travel" in told
     assert told.endswith("all else alike, 70 % is in the direction of travel, 0 % is sideways, 30 % is in heading.")
-    unknown = section(diagnosis_page(made_up("unknown"), "runs"), "Where it lies").blocks[0]
+    unknown = section(page_of("unknown"), "Where it lies").blocks[0]
     assert "all else alike" not in unknown
 
 
 def test_models_that_were_not_given_are_not_shown():
-    (alone,) = tables(section(diagnosis_page(made_up("effects"), "runs"), "How large the gap is"))
-    (beside,) = tables(section(diagnosis_page(made_up("effects", given=True), "runs"), "How large the gap is"))
+    (alone,) = tables(section(page_of("effects"), "How large the gap is"))
+    (beside,) = tables(section(page_of("effects", given=True), "How large the gap is"))
     assert [row[0] for row in alone.rows] == ["nominal model", "corrected model", "floor"]
     assert [row[0] for row in beside.rows] == ["as given", "parameters refitted", "corrected model", "floor"]
 
@@ -163,18 +171,18 @@ def test_nothing_seen_is_a_page_too():
 
 
 def test_what_stays_unexplained_is_told():
-    (_, rest) = tables(section(diagnosis_page(made_up("unknown"), "runs"), "Which effect causes it"))
+    (_, rest) = tables(section(page_of("unknown"), "Which effect causes it"))
     assert rest.rows == [("|v| w in the speed sideways", "contact", 150.0)]
 
 
 def test_no_gap_has_no_map_and_nothing_to_shrink():
-    page = diagnosis_page(made_up("no_gap"), "runs")
+    page = page_of("no_gap")
     parts = section(page, "Where it lies"), section(page, "How far the gap shrinks")
     assert not any(isinstance(block, Figure) for part in parts for block in part.blocks)
 
 
 def test_hidden_effects_come_first_with_the_smallest_visible_size():
-    part = section(diagnosis_page(made_up("no_gap"), "runs"), "What this input could have shown")
+    part = section(page_of("no_gap"), "What this input could have shown")
     (table,) = tables(part)
     assert plain_spaces(table.rows[0][0]) == "camera tilt"
     assert [row[3] for row in table.rows] == sorted(row[3] for row in table.rows)
@@ -263,5 +271,5 @@ def test_no_stretch_is_drawn_where_none_is_left():
 
 
 def test_the_page_says_which_run_served_what():
-    (table,) = tables(section(diagnosis_page(made_up("effects"), "runs"), "Which run served what"))
+    (table,) = tables(section(page_of("effects"), "Which run served what"))
     assert [row[-2:] for row in table.rows] == [("30", "–"), ("–", "30")]
