@@ -24,7 +24,7 @@ from jaxident.log import Log, join
 from jaxident.report.account import account_lines, account_section, draw_account
 from jaxident.report.diagnosis import diagnosis_page
 from jaxident.report.identification import COLUMNS, draw_fit, with_words, write_identification
-from jaxident.report.lead import lead
+from jaxident.report.lead import details, headline, lead
 from jaxident.report.page import Figure, Table, fragment, write_page
 from jaxident.report.parameters import told
 from jaxident.report.words import error as size_of
@@ -96,7 +96,7 @@ class Diagnosis(diagnosing.Diagnosis):
         return "\n".join([lead(self), *account_lines(self.account)])
 
     def _repr_html_(self) -> str:
-        return fragment([lead(self), *account_section(self.account).blocks])
+        return fragment([headline(self), *account_section(self.account, details(self)).blocks])
 
     def to_dataframe(self) -> Any:
         """The account as a pandas data frame: part, root mean squares in position [m] and heading [rad], share of the

@@ -44,12 +44,12 @@ def _shown(account: Account) -> list[Row]:
     return [row for row in account.rows if row.part != DISCOVERED or row.share]
 
 
-def account_section(account: Account) -> Section:
-    """The waterfall, and the same as a table."""
+def account_section(account: Account, details: str = "") -> Section:
+    """The waterfall, what else the verdict tells, and the waterfall as a table."""
     heading = "Who causes how much"
     shown = _shown(account)
     if not shown:
-        return Section(heading, ["No stretch of the logs is left to judge by."])
+        return Section(heading, ["No stretch of the logs is left to judge by.", *([details] if details else [])])
     figure, ax = plot.figure(size=(PHONE, 0.9 + 0.28 * len(shown)))
     draw_account(account, ax)
     rows = [
@@ -65,6 +65,7 @@ def account_section(account: Account) -> Section:
         [
             f"{text}{failed}",
             Figure(plot.image(figure), "Shares of the error by cause", PICTURE),
+            *([details] if details else []),
             table,
             places_line(account),
         ],

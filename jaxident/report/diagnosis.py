@@ -13,7 +13,7 @@ from jaxident.report import causes, words
 from jaxident.report.account import account_section
 from jaxident.report.discovered import discovered
 from jaxident.report.glossary import glossary
-from jaxident.report.lead import deviations, lead
+from jaxident.report.lead import details, deviations, headline
 from jaxident.report.origin import origin_section
 from jaxident.report.page import PHONE, Figure, Page, Section, Table
 from jaxident.report.stretches import served, worst_stretches
@@ -42,7 +42,7 @@ WORDS = (
 def diagnosis_page(found: Diagnosis, name: str, made: Origin | None = None) -> Page:
     """The page of one diagnosis; `name` says of what, such as the logs' folder, and `made` by which command."""
     sections = [
-        account_section(found.account),
+        account_section(found.account, details(found)),
         *worst_stretches(found),
         _gap(found),
         _where(found),
@@ -55,7 +55,7 @@ def diagnosis_page(found: Diagnosis, name: str, made: Origin | None = None) -> P
         glossary(*WORDS),
         *origin_section(made),
     ]
-    return Page(f"Diagnosis of {name}", lead(found), sections, f"jaxident {version('jaxident')}", found.next)
+    return Page(f"Diagnosis of {name}", headline(found), sections, f"jaxident {version('jaxident')}", found.next)
 
 
 def _gap(found: Diagnosis) -> Section:

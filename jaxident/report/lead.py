@@ -12,9 +12,22 @@ CLEAREST = 3
 
 
 def lead(found: Diagnosis) -> str:
-    """The verdict in a few sentences, what was discovered in one, and what was refused in one."""
+    """The verdict with all that belongs to it, in a few sentences."""
+    return f"{headline(found)} {further}" if (further := details(found)) else headline(found)
+
+
+def details(found: Diagnosis) -> str:
+    """What the headline leaves out: shares, known effects of another size, look-alikes and what was refused; empty
+    where there is nothing of that."""
+    named = found.verdict in ("effects", "partly")
+    own = f"{_due(found)}{_resized(found)}{_doubt(found)}" if named else ""
     refused = f" {told}" if (told := refusal(found)) else ""
-    return f"{_verdict(found)}{_discovered(found)}{refused}"
+    return f"{own}{refused}".strip()
+
+
+def headline(found: Diagnosis) -> str:
+    """The verdict in two or three sentences, and what was discovered in one."""
+    return f"{_verdict(found)}{_discovered(found)}"
 
 
 def refusal(found: Diagnosis) -> str:
@@ -51,7 +64,7 @@ def _verdict(found: Diagnosis) -> str:
             f"alone makes {error(rms['floor'])}."
         )
     if found.verdict in ("effects", "partly"):
-        return f"{_named(found)}{_left(found)}{_resized(found)}{_doubt(found)}"
+        return f"{_named(found)}{_left(found)}"
     if found.verdict == "unknown":
         return f"There is a gap that no effect of the catalogue explains{_place(found)}. {_size(found)}"
     return f"These logs do not suffice for a verdict. {found.next}"
@@ -71,11 +84,11 @@ def _size(found: Diagnosis) -> str:
 
 
 def _named(found: Diagnosis) -> str:
-    """What was named, with the part of the error that it makes."""
+    """What was named, and how large the error is."""
     many = f"{COUNTS.get(len(found.selected), 'several')} unmodelled effects"
     count = "one unmodelled effect" if len(found.selected) == 1 else many
     begin = "The gap comes from" if found.verdict == "effects" else "A part of the gap comes from"
-    return f"{begin} {count}: {_in_words(found)}. {_size(found)}{_due(found)}"
+    return f"{begin} {count}: {_in_words(found)}. {_size(found)}"
 
 
 def _due(found: Diagnosis) -> str:
