@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TextIO
 DELAY = 2.0
 """Seconds before anything shows."""
 UNSEEN = io.StringIO()
-"""A stream that nobody sees: what is told there shows in a notebook alone. Functions of the package tell there."""
+"""Where functions of the package send their bars: no terminal, so that a bar shows in a notebook alone."""
 
 
 def in_notebook() -> bool:

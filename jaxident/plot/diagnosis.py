@@ -18,7 +18,7 @@ DECADES = 20.0
 FRAME: Any = {"fill": False, "edgecolor": style.VERMILLION, "linewidth": 1.8}
 """Of a bin that stands out."""
 MORE_DECIMALS = 4
-"""That the edges of a map's bins get at most, to tell them apart."""
+"""Decimals that the edges of a map's bins get at most, beyond two digits, where they would look alike."""
 WEAKEST = 0.5
 """Where a logarithmic axis of gains begins at the latest: a smaller gain says nothing."""
 

@@ -15,6 +15,8 @@ from jaxident.plot.names import LENGTH, TURN
 if TYPE_CHECKING:
     from jaxident.estimation.predict import Prediction
 
+COLUMNS = 3
+"""Stretches in a row of a picture of several."""
 BANDS = ((0.05, 0.95, 0.15), (0.25, 0.75, 0.3))
 """Lower and upper quantile of a band, and how dark it is."""
 
@@ -69,9 +71,9 @@ def prediction_error(step_time: Any, position_error: Any, heading_error: Any, *,
 def stretches(measured: Any, predicted: Mapping[str, Any], *, titles: Sequence[str], axes: Any = None) -> Any:
     """Small multiples: measured positions (stretches, rows, 2) [m] and those that some models predict, {model:
     (stretches, rows, 2)}, each from where the first model begins [mm], scales equal in x and y; NaN where the camera
-    saw nothing. Returns the axes."""
+    saw nothing. axes: COLUMNS in a row, or fewer if there are fewer stretches. Returns them."""
     measured = np.asarray(measured, float)
-    columns = min(3, len(measured))
+    columns = min(COLUMNS, len(measured))
     rows = -(-len(measured) // columns)
     axes = style.new_axes(rows, columns, (style.WIDTH, 0.4 + 2.1 * rows)) if axes is None else axes
     unit, scale = LENGTH

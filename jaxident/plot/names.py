@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 _SYMBOLS = {"alpha": r"\alpha", "delta": r"\delta", "epsilon": r"\epsilon", "dead_zone": "D"}
 DIMENSIONLESS = "–"
+"""What stands in place of a unit where a number has none."""
 _UNITS = {
     "alpha": (DIMENSIONLESS, 1.0),
     "dead_zone": ("unit", 1.0),

@@ -67,7 +67,7 @@ def _lead(found: Identification, verdicts: Sequence[Verdict], percent: np.ndarra
     speak = "One thing speaks" if count == 1 else f"{count} things speak" if count else "Nothing speaks"
     return (
         f"The log determines {sure} of {len(verdicts)} numbers{lent}. The model explains {percent.min():.4g}{SPACE}% "
-        f"of the motion in {worst}, and more of the others. {speak} against it.{ending}"
+        f"of the motion in {worst}, where it is worst. {speak} against it.{ending}"
     )
 
 
@@ -80,7 +80,7 @@ def _next(found: Identification, verdicts: Sequence[Verdict]) -> str:
         return f"{_doubts(found)[0]}{f' {more} more below.' if more else ''}"
     loose = [row.parameter for row in verdicts if row.verdict != "determined"]
     if loose:
-        return f"If you need {', '.join(loose)} more exactly, drive a run that moves more by them. {PREDICT}"
+        return f"If you need {', '.join(loose)} more exactly, drive a run whose path depends more on them. {PREDICT}"
     return PREDICT
 
 

@@ -1,5 +1,5 @@
-"""From a title, a verdict and sections to one HTML page. All text is escaped; the one markup in it are `back ticks`
-around what a reader types."""
+"""From a title, a verdict and sections to one HTML page. All text is escaped. Back ticks around what a
+reader types are the only markup."""
 
 import base64
 import math
@@ -25,7 +25,7 @@ NARROW = 520
 """Width on the page [px] up to which a picture's text stays readable where it is shrunk to a phone's 340."""
 
 PHONE = 4.8
-"""Width of a picture [inch] that makes it NARROW: a phone shows all of it."""
+"""Width of a picture [inch] of which a phone shows all: at 150 dots an inch it is 518 px on the page, just NARROW."""
 
 # Even a page that went wrong loads nothing: the browser allows its own pictures and its own style alone.
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
@@ -66,7 +66,7 @@ class Section(NamedTuple):
 
 class Page(NamedTuple):
     """A title, the verdict in a sentence, the sections and a closing line such as version and seed. next: what to do
-    now, in a sentence that stands below the verdict; picture: shows the verdict, below that."""
+    now, in a sentence that stands below the verdict; picture: what shows the verdict; it stands below that."""
 
     title: str
     lead: str

@@ -8,11 +8,12 @@ from jaxident import plot
 from jaxident.array_types import Array
 from jaxident.diagnosis.diagnose import Diagnosis
 from jaxident.log import run_begins
+from jaxident.plot.motion import COLUMNS
 from jaxident.report.page import Figure, Section, Table
 from jaxident.report.words import length
 
-SHOWN, COLUMNS = 6, 3
-"""Stretches in the picture, and in a row of it."""
+SHOWN = 6
+"""Stretches in the picture."""
 
 
 def worst_stretches(found: Diagnosis) -> list[Section]:
@@ -38,9 +39,10 @@ def worst_starts(found: Diagnosis) -> np.ndarray:
 def draw_stretches(found: Diagnosis, numbers: Array, axes: Any = None) -> Any:
     """Some judging stretches as small multiples; returns the axes."""
     log, starts, errors = found.prepared.log, found.prepared.judging, np.asarray(found.gap.errors)
-    models = {"nominal model": errors[1], "corrected model": errors[-1]}
-    if not (found.corrected_model.effects or found.corrected_model.discovered):
-        del models["corrected model"]  # it is the nominal one
+    models = {"nominal model": errors[1]}
+    nominal, corrected = found.gap.paths
+    if not np.array_equal(nominal, corrected, equal_nan=True):
+        models["corrected model"] = errors[-1]
     begins = (run_begins(log)[starts.run] + starts.row)[numbers]
     rows = begins[:, None] + np.arange(1, 1 + found.prepared.rows)
     measured = np.stack([np.asarray(log.x)[rows], np.asarray(log.y)[rows]], axis=-1)
@@ -50,12 +52,12 @@ def draw_stretches(found: Diagnosis, numbers: Array, axes: Any = None) -> Any:
 
 
 TEXT = (
-    "Where the nominal model errs most, of the stretches that took no part in any fit. A prediction knows what the "
-    "camera saw up to the beginning of a stretch, and then the commands alone, for {horizon:.3g} s."
+    "On these stretches the nominal model errs most. They took no part in any fit. Up to the beginning of a stretch a "
+    "prediction knows what the camera saw, then for {horizon:.3g} s the commands alone."
 )
 PICTURE = (
-    "Each from where it begins; a dot marks where a prediction ends. Above each: how far from the measured position "
-    "that is, camera noise included."
+    "Each path begins at (0, 0); a dot marks where a prediction ends. The numbers above say how far that is from the "
+    "measured position. Camera noise is in them."
 )
 
 
@@ -77,8 +79,8 @@ def served(found: Diagnosis) -> Section:
 
 
 SERVED = (
-    "Stretches of one horizon each. Those that judge took no part in any fit and in no choice of effects, apart from "
-    "effects that they refuse."
+    "Stretches of one horizon each. Those that judge took no part in any fit. They choose no effect; they may refuse "
+    "one."
 )
 
 

@@ -79,7 +79,8 @@ def what_next(study: Study, summary: xarray.Dataset) -> str:
 
 
 FAR = 2.0
-"""Times the Cramér-Rao bound from which another estimator is worth a try."""
+"""Times the Cramér-Rao bound from which another estimator is worth a try. Chosen, not measured: that of maximum
+likelihood stays near 1."""
 SINGLE = "Look at single trials: `jaxident sweep STUDY.toml --trial 0 --out trial` draws one with its log."
 
 

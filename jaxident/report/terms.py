@@ -39,12 +39,12 @@ HEADS = {
     "share of excess": "Part of all the error beyond the floor.",
     "probability by chance": "How often chance alone makes a region stand out as much.",
     "takes part": "The probability that it takes part, whatever else does.",
-    "share of the error": "The part of the nominal model's mean squared error that it makes.",
+    "share of the error": "The part of the nominal model's mean squared error that the effect makes.",
     "size ± standard deviation": "The parameters of the effect in the corrected model.",
     "gain": TERMS["gain of an effect"],
     "visible": "Whether this input would have shown the effect at its typical size.",
     "smallest visible": "The smallest size of the effect that this input would have shown.",
-    "given": "As the model has it that you gave.",
+    "given": "As in the model that you gave.",
     "refitted": "As these logs say, with the effects that were found.",
     "identified": "As these logs say, with the effects that were found.",
     "apart [sd]": "Standard deviations between given and refitted.",
@@ -62,6 +62,6 @@ HEADS = {
     "coverage": TERMS["coverage"],
     "standard error": "Standard deviation of the estimate over repetitions.",
     "fits and names": "Stretches that the effects are found on.",
-    "judges": "Stretches that no fit has seen: all errors on this page are of these.",
+    "judges": "Stretches that no fit has seen. The errors on this page are theirs.",
 }
 """Meanings by the head of a table's column."""

@@ -95,7 +95,7 @@ def test_all_pairs_compose_in_one_program():
     assert full._cache_size() == compiled
 
 
-@pytest.mark.slow  # the usual tests see it in those of the axis of effects, whose trials are mapped
+@pytest.mark.slow  # in the usual tests a trial with effects is compared with the same one in a batch (study)
 def test_mapping_is_the_loop():
     vectors = jnp.stack([to_vector([Effect(n, CATALOGUE[n].typical())]) for n in ("stiction", "motor_lag", "backlash")])
     keys = jax.random.split(jax.random.key(2), 3)

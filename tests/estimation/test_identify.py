@@ -99,7 +99,7 @@ def test_logs_that_cannot_be_identified_say_why(log):
             identify(bad, "paper")
 
 
-@pytest.mark.slow  # the usual tests see it in those of `study`, whose trials are such batches
+@pytest.mark.slow  # in the usual tests a trial alone is compared with the same one in a batch, by both methods (study)
 def test_batches_over_seeds_and_excitations_are_the_loop_compiled_once():
     logs = [
         made(seed, name, 1e-5)

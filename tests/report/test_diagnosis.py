@@ -264,6 +264,13 @@ def test_the_worst_stretches_are_drawn_with_both_models():
     ]
 
 
+def test_a_corrected_model_that_predicts_the_same_is_not_drawn_again():
+    axes = draw_stretches(made_up("unknown"), np.array([0]))
+    assert "nominal model" in {line.get_label() for line in axes.lines}
+    assert "corrected model" not in {line.get_label() for line in axes.lines}
+    assert "corrected" not in axes.get_title(loc="left")
+
+
 def test_no_stretch_is_drawn_where_none_is_left():
     found = made_up("effects")
     nothing = np.full(found.gap.errors.shape, np.nan)

@@ -57,7 +57,7 @@ def test_the_first_screen_says_what_to_do_next_and_shows_the_path(tmp_path):
     found, logs = made()
     for suspicions, rows, words in (
         (("the heading is odd", "so is x"), VERDICTS, "The heading is odd. 1 more below."),
-        ((), VERDICTS, "If you need dead_zone_r more exactly, drive a run"),
+        ((), VERDICTS, "If you need dead_zone_r more exactly, drive a run whose path depends"),
         ((), VERDICTS[:1], "Predict a run that this fit has not seen (<code>jaxident predict</code>)"),
     ):
         write_identification(found._replace(suspicions=suspicions), logs, rows, tmp_path / "page.html")
