@@ -11,15 +11,34 @@ from jaxident import _HOMES
 
 FINDER = doctest.DocTestFinder(recurse=False)
 SESSION = importlib.import_module("jaxident.entry")
-SLOW = ("jaxident.entry", "cramer_rao", "study", "summarise")
+ONLINE = ("jaxident.estimation.increments.recursive", "jaxident.estimation.online.joint_filter")
+SLOW = (
+    *ONLINE,
+    "jaxident.entry",
+    "identify",
+    "predict",
+    "diagnose",
+    "bootstrap",
+    "plan",
+    "cramer_rao",
+    "study",
+    "summarise",
+)
 """They compile an estimator, 10 s and more each."""
 
 
 def examples():
-    """The docstrings with examples: of the session, of public names, and of functions that a package stands for."""
+    """The docstrings with examples: of the session, the online estimators, public names, and functions that a package
+    stands for."""
     called = importlib.import_module("jaxident.files.sweeps").study
+    exporting = importlib.import_module("jaxident.export.export").export
     public = [inspect.unwrap(found) for found in (getattr(ji, name) for name in _HOMES) if callable(found)]
-    found = [test for thing in (SESSION, called, *public) for test in FINDER.find(thing, globs={}) if test.examples]
+    found = [
+        test
+        for thing in (SESSION, *map(importlib.import_module, ONLINE), called, exporting, *public)
+        for test in FINDER.find(thing, globs={})
+        if test.examples
+    ]
     return {test.name: test for test in found}
 
 

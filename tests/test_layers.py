@@ -149,12 +149,14 @@ def test_files_are_short():
     assert not found, "\n".join(found)
 
 
+def code_lines(node):
+    """Lines of a function without its docstring, which may list many arguments."""
+    lines = node.end_lineno - node.lineno + 1
+    return lines - (node.body[0].end_lineno - node.body[0].lineno + 1 if ast.get_docstring(node) else 0)
+
+
 def test_functions_are_short():
-    lengths = {
-        f"{module}.{node.name}": node.end_lineno - node.lineno + 1
-        for module, tree in TREES.items()
-        for node in functions(tree)
-    }
+    lengths = {f"{module}.{node.name}": code_lines(node) for module, tree in TREES.items() for node in functions(tree)}
     found = [f"{name}: {count} lines" for name, count in lengths.items() if count >= FUNCTION_LINES]
     assert not found, "\n".join(found)
 

@@ -13,7 +13,8 @@ import pathlib
 
 import jaxident as ji
 from jaxident.diagnosis.causes.finding import find_effects
-from jaxident.diagnosis.diagnose import believed, decide
+from jaxident.diagnosis.decide import decide
+from jaxident.diagnosis.diagnose import believed
 from jaxident.diagnosis.posterior import judge
 from jaxident.diagnosis.preparation.prepare import prepare
 from jaxident.effects import CATALOGUE

@@ -2,7 +2,6 @@
 
 import dataclasses
 from collections.abc import Sequence
-from math import isfinite
 from typing import NamedTuple
 
 from jaxident.diagnosis.account.account import Account
@@ -14,42 +13,46 @@ from jaxident.diagnosis.account.shrink import Shrink
 from jaxident.diagnosis.account.where import Place
 from jaxident.diagnosis.causes.chance_effects import direct_effects, direct_evidence, present
 from jaxident.diagnosis.causes.finding import CLAIMED, Finding, find_effects
+from jaxident.diagnosis.decide import Parameter, advice, compare_parameters, decide
 from jaxident.diagnosis.detectability import Replay, answers, replay, visible
 from jaxident.diagnosis.posterior import Judgement, judge
-from jaxident.diagnosis.preparation import translate
 from jaxident.diagnosis.preparation.prepare import Prepared, prepare, suspected_wheels
 from jaxident.diagnosis.preparation.translate import to_model
 from jaxident.diagnosis.simulator import Simulator, as_simulator, check_units, inspect_simulator, shared
-from jaxident.effects.coordinates import ASIDE, PLACES
 from jaxident.errors import InputError
 from jaxident.estimation.suspicions.log_suspicions import log_suspicions
 from jaxident.log import Log, join
 from jaxident.numerics import require_float64
 from jaxident.robot.model import Model
 
-FEW, FEWEST = 6, 2
-"""Windows that naming and judging need before anything is claimed."""
-DIFFERENT = 4.0
-"""Standard deviations by which a parameter differs before the verdict says so."""
-
-
-class Parameter(NamedTuple):
-    """A nominal parameter as given and as refitted, in the user's units; None where none was given."""
-
-    name: str
-    nominal: float | None
-    refitted: float
-    standard_deviation: float
-
 
 class Diagnosis(NamedTuple):
-    """What `diagnose` found. verdict: "no_gap", "parameters", "effects", "partly", "unknown" or "undecided". selected:
-    the named effects, in the order in which they were accepted. visible: the gain that each effect of typical size
-    would have had; below CLAIMED this input could not have shown it. replay: what faint effects come out as. surplus:
-    effects that the user's simulator has and the robot has not. discovered: laws in no catalogue, which the corrected
-    model has as well. suspicions: what the log says against itself, with the option that mends it, a line each.
-    refused: effects that fit the runs for naming, and without which the judging runs are predicted better (95 % sure);
-    the corrected model has none of them."""
+    """What `diagnose` found.
+
+    Attributes:
+        verdict: "no_gap", "parameters", "effects", "partly", "unknown" or "undecided".
+        judgement: probabilities of sets of effects, of each effect and of each site.
+        gap: mean squared error of the nominal and the corrected model on rows used for nothing else, and the floor.
+        account: parts of that error, by effect and by place.
+        where: channels and regions of the input where the error is.
+        selected: the named effects, in the order in which they were accepted.
+        parameters: nominal parameters as given and as refitted.
+        visible: the gain that each effect of typical size would have had. Below CLAIMED this input could not have
+            shown it.
+        replay: what faint effects come out as.
+        next: what to do next.
+        nominal_model: the model without the effects.
+        corrected_model: the model with them, and with the discovered laws.
+        shrinks: how far each named effect by itself shrinks the error beyond the floor.
+        prepared: the logs as cut for naming and judging.
+        finding: what the search found.
+        surplus: effects that the user's simulator has and the robot has not.
+        simulator: what was found of that simulator.
+        discovered: laws in no catalogue.
+        suspicions: what the log says against itself, with the option that mends it, a line each.
+        refused: effects that fit the runs for naming, and without which the judging runs are predicted better (95 %
+            sure). The corrected model has none of them.
+    """
 
     verdict: str
     judgement: Judgement
@@ -86,13 +89,37 @@ def diagnose(
     horizon: float | None = None,
     seed: int = 0,
 ) -> Diagnosis:
-    """The gap between a robot's logs and the nominal model: where, which effect, how far it shrinks.
+    """Diagnose the gap between a robot's logs and a nominal model: where it lies, which effect causes it, how far it
+    shrinks.
 
-    The nominal model is `model`, or the one behind the logs `sim` of the user's own simulator, or identified from the
-    logs. Effects that a model or simulator has are no gap: the answer is what the robot has and it lacks. horizon [s]
-    (default 1, of 20 to 60 rows). The runs keep apart: every third, from the second on, serves the gap, its account and
-    its shrink alone. seed: of the laws of noise drawn and the shuffles behind intervals; nothing else is drawn. Needs
-    double precision and a minute. InputError for logs that say nothing, and for a simulator in other units."""
+    Every third run, from the second on, is kept for judging: the gap, its account and how far it shrinks come from
+    these runs alone. A single run is cut into parts. Effects that the nominal model has are no gap. Needs double
+    precision and about a minute.
+
+    Args:
+        logs: the robot's logs, several runs if possible.
+        sim: logs of the user's own simulator. The nominal model is then the one behind these.
+        model: the nominal model. Without `sim` and `model` it is identified from the logs.
+        horizon: how far ahead the models are compared [s], by default 1, bounded to 20 to 60 rows.
+        seed: of the laws of noise that are drawn and of the shuffles behind intervals.
+
+    Returns:
+        Diagnosis: verdict, named effects, account of the error, nominal and corrected model. `report` writes the page.
+
+    Raises:
+        InputError: logs that tell nothing, a simulator in other units, or both `sim` and `model`.
+
+    Examples:
+        >>> import dataclasses, jax, jaxident as ji
+        >>> ji.start_jax()
+        >>> nominal = dataclasses.replace(ji.load_model("published"), noise=ji.Noise(position=5e-4, heading=5e-3))
+        >>> robot = dataclasses.replace(nominal, effects=(ji.Effect("transport_delay", {"delay": 0.1}),))
+        >>> inputs = [ji.excite(jax.random.key(k), "multilevel", 600, robot.sample_period) for k in range(3)]
+        >>> logs = [ji.simulate(robot, u, key=jax.random.key(k + 3)) for k, u in enumerate(inputs)]
+        >>> gap = ji.diagnose(logs, model=nominal)
+        >>> gap.verdict, gap.selected
+        ('effects', ('transport_delay',))
+    """
     require_float64("diagnose")
     check_nominal(logs, sim, model)
     simulator = None if model is None else as_simulator(model, logs)
@@ -156,62 +183,3 @@ def check_nominal(logs: Log | Sequence[Log], sim: Log | Sequence[Log] | None, mo
         raise InputError("give the simulator's logs or a model, not both: each is the nominal model to judge")
     if sim is not None:
         check_units(sim, logs)
-
-
-def compare_parameters(prepared: Prepared, finding: Finding, given, common: tuple[str, ...] = ()) -> list[Parameter]:
-    """Nominal parameters given (coordinates, None where none were) and refitted, in the user's units; then those of the
-    effects that the given model has in common with the robot: the right effect may have the wrong size. A limit that
-    never acts has none."""
-    best = finding.fit
-    if given is not None and ASIDE[0] in common and PLACES[ASIDE] not in best.places:
-        given = translate.abreast_of_marker(given)  # as the refit has it, which is not told its side
-    names, values, deviations = translate.parameters_of(best, prepared.largest)
-    told = [None] * len(names) if given is None else translate.in_user_units(given, prepared.largest)
-    rows = [Parameter(*row) for row in zip(names, told, values, deviations, strict=True)]
-    for name in (name for name in finding.selected if name in common):
-        effect = translate.effect_of(name, best, prepared.largest)
-        before = translate.effect_values(name, given, prepared.largest)
-        rows += [
-            Parameter(f"{name} {key}", _finite(before[key]), effect.parameters[key], deviation)
-            for key, deviation in (effect.standard_deviation or {}).items()
-            if isfinite(effect.parameters[key])
-        ]
-    return rows
-
-
-def _finite(value: float) -> float | None:
-    """A limit that never acts has no number."""
-    return value if isfinite(value) else None
-
-
-def decide(prepared: Prepared, judgement: Judgement, selected: tuple[str, ...], parameters: list[Parameter]) -> str:
-    """The verdict."""
-    if len(prepared.windows.run) < FEW or len(prepared.judging.row) < FEWEST:
-        return "undecided"
-    if selected:
-        return "partly" if judgement.unexplained > 0.5 else "effects"
-    if judgement.unexplained > 0.5:
-        return "unknown"
-    apart = [
-        abs(p.refitted - p.nominal) / max(p.standard_deviation, 1e-12) for p in parameters if p.nominal is not None
-    ]
-    moved = any(z > DIFFERENT for z in apart)
-    return "parameters" if moved else "no_gap"
-
-
-def advice(verdict: str, judgement: Judgement, laws: tuple[Shown, ...] = ()) -> str:
-    """What to record next, in a sentence."""
-    if verdict == "undecided":
-        return "Record at least three runs of 500 samples with both wheels at many levels, forward and backward."
-    sets = [cause for cause in judgement.causes if cause.indistinguishable_from]
-    if verdict in ("effects", "partly") and sets:
-        names = ",".join((sets[0].effect, sets[0].indistinguishable_from[0]))
-        told = names.replace(",", " from ")
-        return f"This input cannot tell {told}: record the one that `jaxident plan MODEL --between {names}` designs."
-    if verdict in ("unknown", "partly") and laws:
-        signal = laws[0].law.signal
-        begin = "Ask what on the robot could make the discovered curve."
-        return f"{begin} Runs in which its signal ({signal}) varies more would tell it better."
-    if verdict in ("unknown", "partly"):
-        return "No effect of the catalogue explains what is left: record runs that stay in the regions where it lies."
-    return "Nothing more is needed for this question; a longer log would find fainter effects."

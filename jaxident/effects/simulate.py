@@ -20,15 +20,26 @@ from jaxident.robot.wheel_sensor import measure_wheels
 def simulate(
     model: Model, log: Log, *, start: State = AT_REST, key: Array | None = None, session_time: Array = 0.0
 ) -> Log:
-    """The log that `model` would have produced under the commands and times of `log` (one run, all arrays (samples,)).
+    """Simulate the log that a robot would have produced under the commands and times of a log.
 
-    Noise-free without a key; with one, slip and camera noise are drawn by the model's noise law, and its random effects
-    act. session_time [s]: at the first row, for effects that drift. Steps may differ for a physical model; a model
-    of free numerators takes no effects and refuses a log of another or an uneven period. InputError for these, for a
-    log of several runs, and for effects that `check_effects` refuses. Differentiable in the model and the start.
+    Differentiable in the model and the start.
 
-    A model with `wheels` gives wheel speeds too, with their noise if there is a key: a wheel that slides turns faster
-    than the ground. InputError for one of free numerators.
+    Args:
+        model: the robot, with effects or without. One with `wheels` gives wheel speeds too; a wheel that slides turns
+            faster than the ground.
+        log: commands and times of one run, all arrays (samples,). Steps may differ, unless the model is one of free
+            numerators.
+        start: state at the first row.
+        key: of slip, camera noise, wheel noise and random effects. Without a key there is no noise, and random effects
+            do not act.
+        session_time: time of the first row in the robot's session [s], for effects that drift.
+
+    Returns:
+        Log: the same rows with the poses of the model.
+
+    Raises:
+        InputError: a log of several runs; effects that `check_effects` refuses; a model of free numerators that has
+            effects or wheels, or meets another period or an uneven one.
 
     Examples:
         >>> import jax, jaxident as ji

@@ -1,14 +1,6 @@
 """Intervals that do not take the noise law on trust: refits to resampled residuals, or to resampled runs.
 
-Likelihood intervals hold under the noise law that was fitted. Two ways out, after Kuensch (1989) and Cameron, Gelbach
-and Miller (2008):
-
-    blocks  innovations resampled in moving blocks, all three channels together, and turned into poses by the fitted
-            robot: keeps what neighbours within a block share, for any input and a single run. Blind to what lasts
-            longer than a block, and to errors that come with certain commands.
-    runs    whole runs drawn with replacement: keeps whatever runs hold, misfits of the model included; needs many.
-
-Every replicate is fitted in full, from the estimate on.
+Every replicate is fitted in full, from the estimate on. `bootstrap` tells the two ways of resampling.
 """
 
 from collections.abc import Sequence
@@ -50,9 +42,14 @@ NORMAL_HALF = 1.96
 class Bootstrap(NamedTuple):
     """Refits to resampled data.
 
-    order: names of the unknowns. replicates (count, unknowns) in natural units; ok (count,): whether each refit
-    arrived. covariance (unknowns, unknowns) and 95 % interval (unknowns, 2) from those that did. resample: "blocks" or
-    "runs"; block: rows in a block, None for whole runs.
+    Attributes:
+        order: names of the unknowns.
+        replicates: (count, unknowns) in natural units.
+        ok: (count,), whether each refit arrived.
+        covariance: (unknowns, unknowns), from those that arrived.
+        interval: (unknowns, 2), 95 %, likewise.
+        resample: "blocks" or "runs".
+        block: rows in a block, None for whole runs.
     """
 
     order: tuple[str, ...]
@@ -74,11 +71,40 @@ def bootstrap(
     block: int | None = None,
     d_max: float | None = None,
 ) -> Bootstrap:
-    """Replicates of a maximum-likelihood fit `found` to `logs`, and 95 % intervals from them.
+    """Refit a maximum-likelihood model to resampled data, for intervals that do not take the noise law on trust.
 
-    block: rows, by default from the innovations' correlation (`block_length`). d_max as given to `identify`. InputError
-    for other methods, too few replicates or runs, or a block that no run holds; WorkError where fewer than half
-    the refits arrive. Needs double precision.
+    Blocks of innovations, all three channels together, become poses by the fitted robot. They keep what neighbours
+    within a block share, for any input and a single run. They are blind to what lasts longer than a block, and to
+    errors that come with certain commands. Whole runs drawn with replacement keep all that runs hold, misfits of the
+    model included; that needs many. After Kuensch (1989) and Cameron, Gelbach and Miller (2008). Needs double
+    precision.
+
+    Args:
+        key: of the random draws.
+        found: the fit, by `identify`.
+        logs: the logs that it was fitted to.
+        count: number of replicates, at least 40.
+        resample: "blocks" of innovations, or whole "runs" (at least five).
+        block: rows in a block, by default from the correlation of the innovations (`block_length`).
+        d_max: the bound of the dead zones as given to `identify` [unit of the command].
+
+    Returns:
+        Bootstrap: the replicates, whether each arrived, their covariance and 95 % intervals.
+
+    Raises:
+        InputError: another method than the maximum likelihood, too few replicates or runs, a block that no run holds.
+        WorkError: fewer than half of the refits arrive.
+
+    Examples:
+        >>> import dataclasses, jax, jaxident as ji
+        >>> ji.start_jax()
+        >>> robot = dataclasses.replace(ji.load_model("published"), noise=ji.Noise(position=5e-4, heading=5e-3))
+        >>> inputs = ji.excite(jax.random.key(0), "multilevel", 300, robot.sample_period)
+        >>> log = ji.simulate(robot, inputs, key=jax.random.key(1))
+        >>> found = ji.identify(log, noise_law="white")
+        >>> refits = ji.bootstrap(jax.random.key(2), found, log, count=40)
+        >>> refits.order[0], refits.interval.shape
+        ('rate_1', (10, 2))
     """
     require_float64("bootstrap")
     if found.fit is None:

@@ -34,12 +34,18 @@ D_MAX_SHARE = 0.9
 
 
 class Identification(NamedTuple):
-    """A model, the covariance of its parameters in `model.parameter_order`, residuals with NaN where there is none, and
-    whether every stage converged.
+    """What `identify` found.
 
-    By maximum likelihood: residuals a `Pose` [m], [rad] (rows,), and the fit. Otherwise one-step residuals, an
-    `Increment` [m], [rad] (samples,), and by the paper how the recursion came about. suspicions: what the log says
-    against the method's assumptions, a line each.
+    Attributes:
+        model: the model, with standard deviations.
+        covariance: of its parameters, in `model.parameter_order`.
+        residuals: NaN where there is none. By maximum likelihood a `Pose` [m], [rad] (rows,), otherwise one-step
+            residuals, an `Increment` [m], [rad] (samples,).
+        ok: whether every stage converged.
+        fit: by maximum likelihood: the fit itself.
+        setup: by the paper's method: the batch initialisation.
+        history: by the paper's method: the estimates along the recursion.
+        suspicions: what the log says against the assumptions, a line each.
     """
 
     model: Model
@@ -63,17 +69,42 @@ def identify(
     d_max: float | None = None,
     reading: str | None = None,
 ) -> Identification:
-    """The model of the robot behind one or several logs, runs in the order given.
+    """Identify the model of a robot from one or several logs.
 
-    method "maximum-likelihood": physical parameters from whole runs, uneven or not, under a noise_law "white", "ar1",
-    "slip", "slip-ar1" or, by default, "auto": white unless its residuals are coloured, then the likeliest; with
-    `coupling` of the two speeds if asked for; wheel speeds count as well unless they contradict the camera. method
-    "paper": batch initialisation on the setup time (section VI), then recursive least squares (15)-(18) over the rest
-    of an even log. Its settings: setup_time [s] from the start (default: 200 samples or three tenths, whichever is
-    more); forgetting in (0, 1] (default 1); reading of (21): "one_step" (default), best on real robots, or "free_run".
-    methods "instrumental-variables" (one even run without gaps) and "key-term-least-squares" (even runs): yardsticks,
-    the same equations from all samples at once. d_max bounds the dead zones [unit of the command] (default: 0.9 of the
-    largest command). Needs double precision; InputError says what a log lacks, WorkError that nothing finite comes out.
+    The maximum likelihood finds physical parameters under which the measured poses are likeliest. The paper's method
+    is Mendes and Medeiros': batch initialisation (section VI), then recursive least squares (15)-(18). Needs double
+    precision.
+
+    Args:
+        logs: commands and poses. Several logs are runs of the same robot, in the order given.
+        method: "maximum-likelihood" takes whole runs, evenly sampled or not. It uses wheel speeds as well, unless they
+            contradict the camera. "paper" takes even logs. Two yardsticks solve the paper's equations from all
+            samples at once: "instrumental-variables" (one even run without gaps), "key-term-least-squares" (even runs).
+        noise_law: for the maximum likelihood: "white", "ar1", "slip" or "slip-ar1" (`Noise` explains the parts). "auto"
+            takes white, and the likeliest of all where the residuals of white are coloured.
+        coupling: for the maximum likelihood: whether either speed may act on the other.
+        setup_time: for the paper's method: time of the batch initialisation from the start [s]. By default 200 samples
+            or three tenths of the log, whichever is more.
+        forgetting: for the paper's method: forgetting factor in (0, 1], by default 1.
+        d_max: largest dead zone that is looked for [unit of the command], by default 0.9 of the largest command.
+        reading: for the paper's method: how (21) is read, "one_step" (default, best on real robots) or "free_run".
+
+    Returns:
+        Identification: the model with its standard deviations, the covariance, the residuals, `ok` (whether every stage
+            converged), and suspicions about the log.
+
+    Raises:
+        InputError: an unknown method, a setting that does not suit the method, or a log that lacks what it needs.
+        WorkError: nothing finite comes out.
+
+    Examples:
+        >>> import jax, jaxident as ji
+        >>> ji.start_jax()
+        >>> robot = ji.load_model("published")
+        >>> inputs = ji.excite(jax.random.key(0), "multilevel", 600, robot.sample_period)
+        >>> found = ji.identify(ji.simulate(robot, inputs), "key-term-least-squares")
+        >>> found.model.dead_zone.round(3).tolist()
+        [0.25, 0.2]
     """
     require_float64("identify")
     _check_method(method, coupling, {"setup time": setup_time, "forgetting": forgetting, "reading": reading})

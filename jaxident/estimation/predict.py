@@ -19,9 +19,21 @@ from jaxident.robot.simulate import check_period
 
 
 class Prediction(NamedTuple):
-    """One entry per predicted row (rows,): the run, the row of it that the prediction starts from, the steps since,
-    the time [s], the pose [m], [rad] and its standard deviation (`predict` says from what); run_up: whether the start
-    comes from a run-up of earlier commands, because the filter did not converge there."""
+    """Free runs of a model, one entry per predicted row (rows,).
+
+    Attributes:
+        run: number of the run.
+        start: row of the run that the free run starts from.
+        step: rows since.
+        t: time [s].
+        x: predicted position [m].
+        y: predicted position [m].
+        theta: predicted heading [rad].
+        sd_x: standard deviation of x [m]; `predict` says of what.
+        sd_y: standard deviation of y [m].
+        sd_theta: standard deviation of theta [rad].
+        run_up: whether the start comes from a run-up of earlier commands, because the filter did not converge there.
+    """
 
     run: Any
     start: Any
@@ -45,17 +57,39 @@ def predict(
     stride: int | None = None,
     session_time: float | None = None,
 ) -> Prediction:
-    """Free runs over `horizon` rows from rows burn_in, burn_in + stride, ... of each run (stride: the horizon).
+    """Predict the poses of a log from its commands, in free runs from many rows of it.
 
-    A physical model, with effects or without, starts from the filtered state (`run_ahead`): over the last `burn_in`
-    rows, with slip over at least FORGOTTEN. The deviations tell of start state, slip and the covariance of the
-    parameters. A start where the filter does not converge comes from a run-up of earlier commands from rest, laid on
-    the last pose. A model of free numerators is fitted to the poses of the burn-in; its deviations tell of that fit
-    alone. session_time [s]: that of the first row, for effects that drift; by default where the
-    log stood among those that the model was made from, or right after them (`session.session_time`). Runs follow each
-    other in it. Runs too short to start in are left out; a free
-    run ends with its run. InputError where no run is long enough, and for effects that `check_effects` refuses. Needs
-    double precision.
+    Free runs begin at rows burn_in, burn_in + stride, ... of each run. A physical model, with effects or without,
+    begins from the state that a filter finds in the rows before (`run_ahead`). Where the filter does not converge, the
+    free run begins from the speed that earlier commands give from rest, at the last pose. A model of free numerators is
+    fitted to the poses of the burn-in. Needs double precision.
+
+    Args:
+        model: the robot.
+        log: commands and poses, one run or several. Runs too short to begin in are left out.
+        horizon: rows of a free run. One that reaches the end of its run ends there.
+        burn_in: rows that the filter of the start sees; with slip at least FORGOTTEN seconds.
+        stride: rows between two starts, by default the horizon.
+        session_time: time of the first row in the robot's session [s], for effects that drift. By default where the log
+            stood among those that the model was made from, or right after them.
+
+    Returns:
+        Prediction: one entry per predicted row: run, start, step, time [s], pose [m], [rad] and its standard deviation.
+            The deviation holds the start state, slip and the covariance of the parameters; for free numerators the fit
+            of the start alone. `prediction_error` compares it with the log.
+
+    Raises:
+        InputError: no run is long enough, a number of rows below 1, or effects that cannot act together.
+
+    Examples:
+        >>> import dataclasses, jax, jaxident as ji
+        >>> ji.start_jax()
+        >>> robot = dataclasses.replace(ji.load_model("published"), noise=ji.Noise(position=5e-4, heading=5e-3))
+        >>> inputs = ji.excite(jax.random.key(0), "multilevel", 300, robot.sample_period)
+        >>> log = ji.simulate(robot, inputs, key=jax.random.key(1))
+        >>> print(ji.predict(robot, log, horizon=30))
+        9 free runs of 1 s, 9 end at a measured pose
+        error there: ...
     """
     require_float64("predict")
     if model.effects or model.discovered:

@@ -41,8 +41,14 @@ USE = {
 
 
 class Export(NamedTuple):
-    """text: of the file. commands: of the wrapper, None where none is needed. parts: what each part became.
-    assumed: sentences on what the model does not tell."""
+    """An exported model.
+
+    Attributes:
+        text: of the file.
+        commands: of the wrapper of commands, None where none is needed.
+        parts: what each part of the model became.
+        assumed: sentences on what the model does not tell.
+    """
 
     text: str
     commands: str | None
@@ -62,13 +68,33 @@ def export(
     command_unit: str = "unit",
     diagnosis: str | os.PathLike | None = None,
 ) -> Export:
-    """A model, or the file that holds it, in the words of a target (`TARGETS`); with a path also written there, the
-    wrapper of commands beside it as `NAME_commands.py`.
+    """Export a model to a simulator, a controller or a program without this package.
 
-    wheel_radius, track [m], mass [kg]: where a target needs what speeds do not tell; a track is the robot's own, beside
-    the one at which it moves. limit: the largest command. command_unit: "rad/s" or "m/s" if commands are wheel speeds.
-    diagnosis: a diagnosis.json that knows what effects are worth; by default that in the folder of a model file.
-    InputError for an unknown target, a model that it cannot hold, a size that makes no sense, or a file.
+    Args:
+        model: the model, or its file.
+        to: the target, one of `TARGETS`.
+        path: where to write it; the wrapper of commands goes beside it as `NAME_commands.py`. Without a path nothing is
+            written.
+        wheel_radius: [m], where the target needs it.
+        track: distance of the wheels [m], where the target needs it. It is the robot's own, beside the one at which it
+            moves.
+        mass: [kg], where the target needs it.
+        limit: the largest command [unit of the command].
+        command_unit: "rad/s" or "m/s" if commands are wheel speeds.
+        diagnosis: a diagnosis.json that knows what effects are worth, by default the one beside a model file.
+
+    Returns:
+        Export: the text, the wrapper, and how each part of the model is carried.
+
+    Raises:
+        InputError: an unknown target, a model that the target cannot hold, a size that makes no sense, or a file.
+
+    Examples:
+        >>> import jaxident as ji
+        >>> ji.start_jax()
+        >>> found = ji.export(ji.load_model("published"), "python")
+        >>> [part.name for part in found.parts]
+        ...
     """
     if to not in TARGETS:
         raise InputError(f"unknown target {to!r}; there are {', '.join(TARGETS)}")

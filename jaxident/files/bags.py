@@ -44,14 +44,29 @@ def read_bag(
     units: Mapping[str, str | float] | None = None,
     **settings: Any,
 ) -> Log:
-    """One log from two topics of a bag, or three; `settings` (period, track, pose_offset, hold_timeout) go to `merge`.
+    """Read one log from two topics of a ROS bag, or three with wheel speeds (ROS 1, or ROS 2 as sqlite3 or MCAP).
 
-    A topic that is left out is the only one that looks right. child_frame: which transform of a tf topic is the robot.
-    frames: a fixed frame and the robot's, between which the transforms of all tf topics are composed (`transforms`).
-    wheel_order: indices (Float64MultiArray) or joint names (JointState) of the right and the left wheel, for commands.
-    wheels_topic: measured wheel speeds, JointState; wheel_joints: names of its right and left joint. bag_time: the time
-    of recording in place of the headers' stamps. columns, units: changes to the columns v,w or u_r,u_l, x,y,theta and
-    wheel_r,wheel_l as in `Log.from_dataframe`. InputError names what is wrong and what there is.
+    Needs the extra `ros`. What is odd about the topics is a UserWarning.
+
+    Args:
+        path: the bag.
+        command_topic: of the commands. Left out, it is the only topic that looks right.
+        pose_topic: of the poses, likewise.
+        wheels_topic: of measured wheel speeds, JointState.
+        child_frame: of a tf topic: which transform is the robot.
+        frames: a fixed frame and the robot's, between which the transforms of all tf topics are composed.
+        wheel_order: right and left wheel in the commands: indices (Float64MultiArray) or joint names (JointState).
+        wheel_joints: names of the right and the left joint of `wheels_topic`.
+        bag_time: whether the time of recording replaces the stamps of the headers.
+        columns: changes to the columns v,w or u_r,u_l, x,y,theta and wheel_r,wheel_l, as in `Log.from_dataframe`.
+        units: of the columns, likewise.
+        **settings: period, track, pose_offset and hold_timeout, as in `merge`.
+
+    Returns:
+        Log: one run on the clock of the poses, or of the period.
+
+    Raises:
+        InputError: one line that names what is wrong, and what the bag holds.
     """
     chosen, choice = make_columns(columns, units), Choice(child_frame, wheel_order, bag_time, frames, wheel_joints)
     commands, poses, notes = read_bag_streams(path, command_topic, pose_topic, choice, chosen)

@@ -27,16 +27,24 @@ def read_log(
     columns: Mapping[str, str] | str | None = None,
     units: Mapping[str, str | float] | None = None,
 ) -> Log:
-    """One log with all runs of a file, all arrays (rows,) float64, run int64; "-" is the standard input, a folder
-    stands for its logs (`find_logs`), one after the other, and so does a list of files and folders.
+    """Read a log: a CSV file, a folder of them, or a list of files and folders, one after the other.
 
-    columns, units: where the file has other names and units, as in `Log.from_dataframe`. A quaternion in columns
-    qx,qy,qz,qw may stand for theta; cells may be parted by semicolons or tabs; a time may be an ISO date (Unix time).
+    Empty cells of poses and wheel speeds become NaN. The command of the last row of a run may be empty, for it is never
+    applied; it is read as a repeat of the command before (0 in a run of a single row). Cells may be parted by
+    semicolons or tabs. Further columns are ignored with a UserWarning.
 
-    Empty cells of poses and wheel speeds are NaN. The command of the last row of a run may be empty: it is never
-    applied and is read as a repeat of the command before (0 in a run of a single row). Further columns are ignored with
-    a UserWarning.
-    InputError in one line names the file, the line and what would be right.
+    Args:
+        path: the file or folder, or a list of these; "-" is the standard input. A folder stands for its logs
+            (`find_logs`).
+        columns: where the file has other names, {"t": "time_ms"} or "t=time_ms:ms,theta=yaw:deg". A quaternion in
+            qx,qy,qz,qw may stand for theta; a time may be an ISO date (then Unix time).
+        units: {"t": "ms", "theta": "deg"}, or numbers to multiply by.
+
+    Returns:
+        Log: all runs, arrays (rows,) float64, `run` int64.
+
+    Raises:
+        InputError: one line that names the file, the line in it and what would be right.
 
     Examples:
         >>> import jaxident as ji
@@ -93,11 +101,18 @@ def find_simulated(paths: Source | Sequence[Source]) -> list[str]:
 
 
 def write_log(log: Log, path: Source) -> None:
-    """Write a log as CSV, gzipped if the name ends in .gz; the file appears whole or not at all.
+    """Write a log as CSV, whole or not at all; gzipped if the name ends in .gz.
 
-    Numbers are the shortest that read back as they are, NaN in a pose or a wheel speed is an empty cell; the column run
-    is there only if there is more than one run, those of the wheels only if the log has wheel speeds. InputError for a
-    log that `read_log` would refuse or a target that cannot be written, WorkError if the disk is full.
+    Numbers are the shortest that read back as they are. NaN in a pose or a wheel speed becomes an empty cell. The
+    column run is there if there is more than one run, those of the wheels if the log has wheel speeds.
+
+    Args:
+        log: the log.
+        path: the file.
+
+    Raises:
+        InputError: a log that `read_log` would refuse, or a file that cannot be written.
+        WorkError: the disk is full.
 
     Examples:
         >>> import jaxident as ji

@@ -57,10 +57,17 @@ _compiled_image = jax.jit(to_difference)
 
 
 def load_model(path: Source, known_effects: Collection[str] = tuple(CATALOGUE)) -> Model:
-    """The model in a file, or a shipped robot by its name (`SHIPPED`).
+    """Load a model from its file, or a robot that comes with the program by its name.
 
-    `known_effects` are the names that the file's effects may have, those of the catalogue unless told otherwise.
-    InputError names the file and the key at fault.
+    Args:
+        path: the file, or "published" or "published-simplified".
+        known_effects: names that the file's effects may have, by default those of the catalogue.
+
+    Returns:
+        Model: its numbers are NumPy float64 arrays.
+
+    Raises:
+        InputError: one line that names the file and the key at fault.
 
     Examples:
         >>> import jaxident as ji
@@ -77,7 +84,15 @@ def load_model(path: Source, known_effects: Collection[str] = tuple(CATALOGUE)) 
 
 
 def save_model(model: Model, path: Target) -> None:
-    """Write a model file, whole or not at all; it reads back exactly. InputError for a model that would not load.
+    """Write a model file, whole or not at all; it reads back exactly.
+
+    Args:
+        model: the model.
+        path: the file.
+
+    Raises:
+        InputError: a model that would not load, or a file that cannot be written.
+        WorkError: the disk is full.
 
     Examples:
         >>> import jaxident as ji

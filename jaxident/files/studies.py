@@ -76,7 +76,25 @@ _FREE = ("name", "excitations", "amplitude", "samples", "period", "effects", "ho
 
 
 def read_study(path: Source, *, seed: int = 0) -> Study:
-    """The study in a TOML file; models in it are found beside it. InputError names the file and the key at fault."""
+    """Read a study from a TOML file; models in it are found beside it.
+
+    Args:
+        path: the file.
+        seed: the number that all random draws follow from.
+
+    Returns:
+        Study: what `jaxident.study` runs.
+
+    Raises:
+        InputError: one line that names the file and the key at fault.
+
+    Examples:
+        >>> import pathlib, jaxident as ji
+        >>> text = 'seeds = 8\nnoise = [1e-5]\nestimators = ["batch"]\n[[robots]]\nmodel = "published"\n'
+        >>> _ = pathlib.Path("study.toml").write_text(text)
+        >>> ji.read_study("study.toml").seeds
+        8
+    """
     return parse_study(read_text(path, "TOML", LARGEST_STUDY), os.fspath(path), seed=seed)
 
 

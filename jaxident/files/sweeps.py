@@ -64,11 +64,20 @@ def study(
     scheduler: str | None = None,
     seed: int = 0,
 ) -> xarray.Dataset:
-    """Run a Monte-Carlo study: all its trials with named axes, units and provenance.
+    """Run a Monte-Carlo study. `jaxident.summarise` makes statistics of the result. Needs double precision.
 
-    content: a `Study` (whose own seed counts), the content of a study file as a dict, or a file's path. Without `out`
-    in memory; with it in a folder, as `jaxident sweep` does, and the trials are read when they are used.
-    `jaxident.summarise` makes statistics of the result. InputError names the key at fault. Needs double precision.
+    Args:
+        content: a `Study` (whose own seed counts), the content of a study file as a dict, or the path of a file.
+        out: a folder for the trials, which can be continued after an interruption as with `jaxident sweep`. Without it
+            the trials stay in memory.
+        scheduler: address of a Dask scheduler, with `out`.
+        seed: the number that all random draws follow from.
+
+    Returns:
+        xarray.Dataset: every trial, with named axes, units and provenance. From a folder, trials are read when used.
+
+    Raises:
+        InputError: one line that names the key at fault.
 
     Examples:
         >>> import jaxident as ji

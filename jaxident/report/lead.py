@@ -1,7 +1,8 @@
 """The first lines of a diagnosis's page: the verdict, in a sentence or two."""
 
 from jaxident.diagnosis.account.account import REST
-from jaxident.diagnosis.diagnose import DIFFERENT, Diagnosis, Parameter
+from jaxident.diagnosis.decide import DIFFERENT, Parameter
+from jaxident.diagnosis.diagnose import Diagnosis
 from jaxident.report import words
 from jaxident.report.discovered import sentence
 from jaxident.report.words import EFFECTS, NOMINAL, error, number, parameters, percent, plain, together

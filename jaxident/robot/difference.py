@@ -16,7 +16,10 @@ from jaxident.robot.drive import Physical
 class Difference(NamedTuple):
     """Parameters of (13)-(14) at one sample period.
 
-    alpha (2,); delta, epsilon (2, 2) [m and rad per unit of command], rows l, theta, columns right, left.
+    Attributes:
+        alpha: (2,), of the length and of the turn.
+        delta: (2, 2) [m and rad per unit of command]; rows length and turn, columns right and left.
+        epsilon: (2, 2), the same for the command before.
     """
 
     alpha: Any
@@ -25,10 +28,24 @@ class Difference(NamedTuple):
 
 
 def to_difference(physical: Physical, period: Array) -> Difference:
-    """Zero-order-hold image of the drive at a sample period [s], its coupling neglected.
+    """Convert physical parameters to the difference equations (13)-(14): the zero-order-hold image, without coupling.
 
-    With a = exp(-r h), its integral p and double integral q over the period: alpha = a, delta = q b,
-    -epsilon = (p^2 - a q) b, from z-transforming b / (s (s + r)).
+    With a = exp(-r h), its integral p and double integral q over the period h: alpha = a, delta = q b and
+    -epsilon = (p^2 - a q) b, from the z-transform of b / (s (s + r)).
+
+    Args:
+        physical: the drive; its coupling is neglected.
+        period: sample period h [s].
+
+    Returns:
+        Difference: parameters at that period.
+
+    Examples:
+        >>> import jaxident as ji
+        >>> ji.start_jax()
+        >>> drive = ji.load_model("published").physical
+        >>> ji.to_difference(drive, 0.1).alpha.round(4).tolist()
+        [0.9473, 0.4576]
     """
     decay, once, twice = hold_integrals(jnp.asarray(physical.rate), period)
     gain = jnp.asarray(physical.gain)
@@ -36,10 +53,24 @@ def to_difference(physical: Physical, period: Array) -> Difference:
 
 
 def to_physical(difference: Difference, period: Array) -> Physical:
-    """The drive without coupling whose image is closest: rate from the pole, gain from the gain at rest.
+    """Convert difference equations to physical parameters: the drive without coupling whose image is closest.
 
-    rate = -log(alpha) / h and gain = (delta - epsilon) / (h p). Both numerator coefficients of a real hold image
-    follow from one gain; free ones do not, and their sum is what data determine best. Needs 0 < alpha < 1.
+    rate = -log(alpha) / h from the pole, gain = (delta - epsilon) / (h p) from the gain at rest. Both numerator
+    coefficients of a real hold image follow from one gain. Free ones do not; data determine their sum best.
+
+    Args:
+        difference: parameters at one sample period, 0 < alpha < 1.
+        period: that sample period h [s].
+
+    Returns:
+        Physical: rates [1/s] and gains, no coupling.
+
+    Examples:
+        >>> import jaxident as ji
+        >>> ji.start_jax()
+        >>> drive = ji.load_model("published").physical
+        >>> ji.to_physical(ji.to_difference(drive, 0.1), 0.1).rate.round(2).tolist()
+        [0.54, 7.82]
     """
     alpha = jnp.asarray(difference.alpha)
     rate = -jnp.log(alpha) / period

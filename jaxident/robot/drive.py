@@ -25,8 +25,11 @@ Pair = tuple[Any, Any]
 class Physical(NamedTuple):
     """Continuous-time parameters of the drive; the robot itself, whatever the camera's period.
 
-    rate (2,) [1/s]; gain (2, 2) [m/s^2 and rad/s^2 per unit of command], rows v, w, columns right, left;
-    coupling (2,) [m/s^2 per rad/s, rad/s^2 per m/s], or None for a robot without: the cheaper program.
+    Attributes:
+        rate: of the speed along and of the turn rate (2,) [1/s].
+        gain: (2, 2) [m/s^2 and rad/s^2 per unit of command]; rows v and w, columns right and left.
+        coupling: how each speed acts on the other (2,) [m/s^2 per rad/s, rad/s^2 per m/s]; None for a robot without,
+            which is the cheaper program.
     """
 
     rate: Any

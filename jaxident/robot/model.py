@@ -83,11 +83,21 @@ class Discovered:
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class Model:
-    """A robot: dead zones, then a linear drive in one of two forms.
+    """A robot: dead zones, then a linear drive. A pytree: numbers are leaves, names are structure.
 
-    `dynamics` is `Physical`, true at any sample period, or `Difference`, the paper's free numerators, true at
-    `sample_period` [s] only. alpha (2,), delta and epsilon (2, 2) are read from either. wheels: of a robot that
-    measures its wheel speeds. A pytree: numbers are leaves, names are structure.
+    Attributes:
+        sample_period: time between two rows [s].
+        dynamics: `Physical`, true at any sample period, or `Difference`, the paper's free numerators, true at
+            `sample_period` only. `alpha` (2,), `delta` and `epsilon` (2, 2) are read from either.
+        dead_zone: of the right and the left wheel (2,) [unit of the command].
+        noise: of the camera and of slip, None where it is not known.
+        effects: unmodelled effects in force.
+        standard_deviation: of the parameters, None where they were not estimated.
+        covariance: of the parameters in `parameter_order`.
+        parameter_order: names.
+        provenance: where the model comes from.
+        discovered: laws in no catalogue.
+        wheels: sensor of the wheel speeds, for a robot that measures them.
     """
 
     sample_period: Any

@@ -14,14 +14,20 @@ from jaxident.robot.drive import Force
 
 
 class Noise(NamedTuple):
-    """The noise law.
+    """The noise law: error of the camera, and random slip of the wheels.
 
-    position [m], heading [rad]: standard deviation of the camera's error. correlation_time [s]: that of the camera
-    error, a first-order autoregression exp(-t / tau); None for white error. slip_along [m/s^1.5], slip_heading
-    [rad/s^1.5]: root spectral density of a random acceleration, drawn for each step and held over it. slip_time [s]:
-    correlation time of that acceleration, a first-order autoregression of the same density at low frequency; None for
-    one that is white. white_position [m], white_heading [rad]: the part of the camera's error that has no memory where
-    the rest has one; None for none.
+    Slip is a random acceleration, drawn for each step and held over it. A memory is a first-order autoregression,
+    exp(-t / tau).
+
+    Attributes:
+        position: standard deviation of the camera's error in x and in y [m].
+        heading: that in heading [rad].
+        correlation_time: memory of the camera's error [s], None for white error.
+        slip_along: root spectral density of the acceleration along the heading [m/s^1.5].
+        slip_heading: that of the turn's acceleration [rad/s^1.5].
+        slip_time: memory of the acceleration [s], which keeps its density at low frequency; None for one that is white.
+        white_position: part of the camera's error that has no memory where the rest has one [m], None for none.
+        white_heading: the same in heading [rad].
     """
 
     position: Any = 0.0

@@ -48,12 +48,23 @@ class EffectSet(NamedTuple):
 class Study(NamedTuple):
     """A Monte-Carlo study: every combination of its axes, each with `seeds` seeds, each seen by every estimator.
 
-    excitations: names of `EXCITATIONS`; samples: rows of a run; period [s]; amplitude [unit of the command]; noise:
-    standard deviations of the camera's position [m], its heading has heading_per_position [rad/m] times as much;
-    correlation_time [s] of both, None for white noise. hold: samples that a level of the excitation lasts. seed: the
-    number that all random draws follow from. chunk: trials computed and stored together, which bounds the memory.
-    effects: sets that are added to every robot in turn, under the same random numbers; where there are none, the robots
-    have their own effects alone, and the trials have no axis `effect`.
+    Attributes:
+        robots: candidates, each a model by its name.
+        estimators: each with its settings.
+        seeds: number of seeds in each cell.
+        noise: standard deviations of the camera's position [m].
+        heading_per_position: those of its heading are so many times as large [rad/m].
+        correlation_time: memory of both [s], None for white noise.
+        excitations: names of `EXCITATIONS`.
+        hold: samples that a level of the excitation lasts.
+        samples: rows of a run.
+        period: sample periods [s].
+        amplitude: largest commands [unit of the command].
+        seed: the number that all random draws follow from.
+        name: what results are called.
+        chunk: trials computed and stored together, which bounds the memory.
+        effects: sets that are added to every robot in turn, under the same random numbers. Without them robots have
+            their own effects alone, and the trials have no axis `effect`.
     """
 
     robots: tuple[Candidate, ...]

@@ -96,10 +96,15 @@ def quantiles(values: np.ndarray, levels: tuple[float, ...]) -> np.ndarray:
 
 
 def summarise(trials: xarray.Dataset, bound: xarray.DataArray | None = None) -> xarray.Dataset:
-    """All statistics of a study, by cell, estimator and parameter, with the failures by reason and the break-down.
+    """Summarise a study: all statistics by cell, estimator and parameter, failures by reason, and the break-down.
 
-    trials may lie on disk: little of them is read at a time. bound: smallest standard deviation possible, such as
-    Cramer and Rao's, on any of the axes of the result; adds `rmse_over_bound`.
+    Args:
+        trials: of `jaxident.study`. They may lie on disk; little of them is read at a time.
+        bound: smallest standard deviation possible, such as Cramér and Rao's, on any of the axes of the result.
+
+    Returns:
+        xarray.Dataset: bias, root mean square error, quantiles, coverage and more, with `rmse_over_bound` if there is a
+            bound. Failed trials count in `failures`, and in no mean.
 
     Examples:
         >>> import jaxident as ji

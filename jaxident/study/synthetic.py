@@ -14,7 +14,18 @@ from jaxident.robot.noise import Noise
 
 
 def excite(key: Array, name: str, samples: int, period: float, *, amplitude: float = 1.0, hold: int = 20) -> Log:
-    """A log (samples,) of commands alone, even at `period` [s]; name is one of `EXCITATIONS`.
+    """Make the commands of an excitation, as a log without poses.
+
+    Args:
+        key: of the random draws.
+        name: one of `EXCITATIONS`.
+        samples: rows.
+        period: time between two rows [s].
+        amplitude: largest command [unit of the command].
+        hold: rows that a level lasts.
+
+    Returns:
+        Log: times and commands (samples,); no pose is measured.
 
     Examples:
         >>> import jax, jaxident as ji

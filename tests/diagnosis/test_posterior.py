@@ -8,7 +8,7 @@ import pytest
 from support.diagnoses import finding_of, made_up
 
 from jaxident.diagnosis.causes.discrepancy_basis import Term
-from jaxident.diagnosis.diagnose import decide
+from jaxident.diagnosis.decide import decide
 from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.posterior import alike, judge, slip_of_drive, unexplained_probability
 from jaxident.diagnosis.simulator import Simulator

@@ -141,7 +141,7 @@ def test_a_slide_turns_the_rim_faster_than_the_ground():
     sliding = robot_with({("traction_limit", "inverse_square"): 6.0, ("traction_limit", "dry"): 1.0,
                           ("traction_limit", "spin"): 0.05})  # fmt: skip
     starts = first_starts(windows)
-    ground = np.asarray(track(sliding, starts, jax.tree.map(jnp.asarray, windows)).v).T
+    ground = np.asarray(jax.jit(track)(sliding, starts, jax.tree.map(jnp.asarray, windows)).v).T
     rim = rim_speeds(sliding[None], starts[None], windows)[0][:, : ground.shape[1]]
     assert np.abs(rim - ground).max() > 0.01
 

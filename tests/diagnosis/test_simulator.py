@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxident.diagnosis.causes import chance_effects
-from jaxident.diagnosis.diagnose import compare_parameters
+from jaxident.diagnosis.decide import compare_parameters
 from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.preparation.pose_screening import Frames
 from jaxident.diagnosis.preparation.translate import abreast_of_marker

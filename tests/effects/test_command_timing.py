@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -52,9 +53,12 @@ def pushed(command, **values):
         for key, value in own.items():
             vector[PLACES[name, key]] = value
     t = 0.03 * np.arange(len(command))[:, None]
-    found = pushes(by_effect(jnp.asarray(vector)), drive_of(jnp.asarray(vector)), jnp.zeros(2), jnp.asarray(t),
-                   jnp.array([0.5]), jnp.asarray(command)[:, None])  # fmt: skip
-    return np.asarray(found.mean[:, 0])
+    return np.asarray(_pushed(vector, t, np.array([0.5]), command[:, None])[:, 0])
+
+
+@jax.jit
+def _pushed(vector, t, session, command):
+    return pushes(by_effect(vector), drive_of(vector), jnp.zeros(2), t, session, command).mean
 
 
 def test_the_fast_program_holds_what_was_read_last():

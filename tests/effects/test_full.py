@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -172,5 +173,5 @@ def test_a_program_of_few_parts_is_the_whole_one():
     """The others at neutral; a delay alone takes no substeps, and its nominal rule for the position is coarser."""
     for names in (("transport_delay", "direction_gain"), ("payload_change", "stiction", "camera_scale"), ("slope",)):
         vector = to_vector([Effect(name, CATALOGUE[name].typical()) for name in names])
-        part = run_full(DRIVE, WIDTH, vector, SHORT.t, SHORT.command, START, parts=frozenset(names))
+        part = jax.jit(partial(run_full, parts=frozenset(names)))(DRIVE, WIDTH, vector, SHORT.t, SHORT.command, START)
         np.testing.assert_allclose(np.stack(part, axis=1), full(vector, SHORT, None), rtol=1e-9, atol=1e-9)

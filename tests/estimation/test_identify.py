@@ -17,7 +17,7 @@ from jaxident.study.synthetic import excite
 
 ROBOT = load_model("published-simplified")
 TRUTH = np.asarray(difference_vector(ROBOT.difference, ROBOT.dead_zone))
-ROWS, SETUP = 400, 150
+ROWS, SETUP = 600, 200
 
 
 def made(seed, name="staircase", noise=None):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.diagnoses import LARGEST, VERDICTS, discovered_law, finding_of, made_up
 
-from jaxident.diagnosis.diagnose import Parameter
+from jaxident.diagnosis.decide import Parameter
 from jaxident.diagnosis.smallest_effects import smallest_sizes
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.report import Figure, Table, render

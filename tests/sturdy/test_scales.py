@@ -10,7 +10,7 @@ from jaxident.files.models import load_model
 from jaxident.log import Log
 from jaxident.study.synthetic import excite, simulate_runs
 
-ROWS = 300
+ROWS = 600
 NUMERATORS = {"delta", "epsilon"}
 
 

@@ -8,13 +8,15 @@ from support.tables import table_of
 from jaxident.diagnosis.account.account import account_of
 from jaxident.diagnosis.account.discovered import Shown
 from jaxident.diagnosis.account.floor import Floor
+from jaxident.diagnosis.account.measure import Gap
 from jaxident.diagnosis.account.shrink import Shrink
 from jaxident.diagnosis.account.where import Place, Region
 from jaxident.diagnosis.causes.discrepancy import Rest
 from jaxident.diagnosis.causes.discrepancy_basis import Term
 from jaxident.diagnosis.causes.finding import Finding, Values
+from jaxident.diagnosis.decide import Parameter
 from jaxident.diagnosis.detectability import Replay
-from jaxident.diagnosis.diagnose import Diagnosis, Gap, Parameter
+from jaxident.diagnosis.diagnose import Diagnosis
 from jaxident.diagnosis.discovery.candidates import Kind
 from jaxident.diagnosis.discovery.forms import Form
 from jaxident.diagnosis.fit.refit import Solution

@@ -34,9 +34,18 @@ KEPT = 8
 
 
 class Plan(NamedTuple):
-    """The next input as a log without poses; the separation `before`, the median of ordinary inputs as long, and
-    `after`, in units of log-likelihood; the sizes of both effects by parameter and the noise that they are for;
-    `assumed`: the camera noise is not all the model's; `area` [m]: width and height of the path without the effects."""
+    """An input for the next run, and what it is worth.
+
+    Attributes:
+        log: the input, a log without poses.
+        before: separation of ordinary inputs as long, their median [log-likelihood].
+        after: separation of this input [log-likelihood].
+        sizes: of both effects, by parameter.
+        noise: that the separation is computed for.
+        assumed: whether the camera noise is not all the model's.
+        area: width and height of the path without the effects [m].
+        ordinary: what ordinary inputs are.
+    """
 
     log: Log
     before: float
@@ -51,12 +60,36 @@ class Plan(NamedTuple):
 def plan(
     model: Model, effects: tuple[str, str], *, samples: int = 600, limit: float = 1.0, seed: int = 0, batches: int = 40
 ) -> Plan:
-    """The input (samples,) with |u| <= limit that best separates two effects on the robot of `model`, from rest.
+    """Plan the input for the next run: the one that best separates two effects, from rest.
 
-    An effect has the size that the model gives it, else the catalogue's typical one with the limit as unit of command;
-    other effects of the model act throughout. `batches` of 8 inputs are tried: in the first half drawn, then made from
-    the best. The same seed gives the same plan. Needs double precision. InputError for names that cannot be separated,
-    a model of free numerators, a limit inside the dead zones, and too few samples.
+    Separation of A and B: with data of a robot that has A, by how much -log p of the best B exceeds that of A, or the
+    other way round, whichever is less (T-optimality: Atkinson and Fedorov 1975, Biometrika 62). It is computed to first
+    order, which overrates it where changed parameters make up for an effect. In the first half of the batches inputs
+    are drawn, then new ones are made from the best. The same seed gives the same plan. Needs double precision.
+
+    Args:
+        model: the robot. Its other effects act throughout.
+        effects: names of the two effects. Each has the size that the model gives it, otherwise the catalogue's typical
+            one, with the limit as the unit of the command.
+        samples: rows of the input.
+        limit: largest command, |u| <= limit [unit of the command].
+        seed: of the draws.
+        batches: how many times 8 inputs are tried.
+
+    Returns:
+        Plan: the input as a log without poses, the separation of ordinary inputs and of this one, the room it needs
+            [m].
+
+    Raises:
+        InputError: names that cannot be separated, a model of free numerators, a limit inside the dead zones, too few
+            samples, discovered laws.
+
+    Examples:
+        >>> import jaxident as ji
+        >>> ji.start_jax()
+        >>> found = ji.plan(ji.load_model("published"), ("transport_delay", "motor_lag"), samples=300, batches=2)
+        >>> len(found.log.t), bool(found.after > found.before)
+        (300, True)
     """
     require_float64("plan")
     check_names(effects)

@@ -1,11 +1,22 @@
 """Recursive least squares on the dead-zone regressors (15)-(18): the paper's estimator, one log row at a time.
 
-    state = init(setup_log)
-    state, info = step(state, Sample(u_r, u_l, x, y, theta))
-
 `step` is pure and jittable: the same function runs inside `run`, under `vmap`, and once per camera frame on a robot.
+
+Examples:
+    >>> import jax, jaxident as ji
+    >>> ji.start_jax()
+    >>> robot = ji.load_model("published")
+    >>> log = ji.simulate(robot, ji.excite(jax.random.key(0), "multilevel", 300, robot.sample_period))
+    >>> setup, rest = log[:200], log[200:]
+    >>> state, step = ji.recursive.init(setup, d_max=0.9), jax.jit(ji.recursive.step)
+    >>> for row in zip(rest.u_r, rest.u_l, *rest.pose):
+    ...     state, info = step(state, ji.recursive.Sample(*row))
+    >>> difference, dead_zone = ji.recursive.parameters(ji.recursive.unpack(state).estimate)
+    >>> dead_zone.round(2).tolist()
+    [0.25, 0.2]
 """
 
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -158,10 +169,15 @@ def init(log: Log, *, d_max: Array, forgetting: Array = 1.0, reading: str = "one
     """State from the setup log (section VI): batch estimate, its covariance, and the last row's command and pose."""
     require_float64("recursive.init")
     require_log(log, "recursive.init")
+    return _first_state(Log(*(jnp.asarray(column) for column in log)), d_max, forgetting, reading)
+
+
+@partial(jax.jit, static_argnames="reading")
+def _first_state(log: Log, d_max: Array, forgetting: Array, reading: str) -> State:
+    """`init` as one program: operation by operation its first call takes seconds longer."""
     observations = observe_log(log)
     setup = initialise(observations, d_max=d_max, reading=reading)
     estimate = start(setup.difference, setup.dead_zone, observations, d_max, forgetting)
-    log = Log(*(jnp.asarray(column) for column in log))
     seen = jnp.isfinite(log.x)
     last = jnp.max(jnp.where(seen, jnp.arange(len(log.t)), -1))
     pose = Pose(*(column[last] for column in log.pose))

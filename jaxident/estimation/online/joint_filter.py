@@ -1,11 +1,21 @@
 """State and parameters in one extended Kalman filter on poses: a recursive estimator that stands camera noise.
 
-    state = init(setup_log, d_max=0.9, memory=5.0)
-    state, info = step(state, Sample(t, u_r, u_l, x, y, theta))
-
 States x, y, theta, v, w, the camera's errors where they have a memory, then log rates, gains and dead zones (Jazwinski
 1970, section 8.4). `step` is pure and jittable: the same function runs inside a scan, under `vmap`, and once per camera
 frame on a robot.
+
+Examples:
+    >>> import dataclasses, jax, jaxident as ji
+    >>> ji.start_jax()
+    >>> robot = dataclasses.replace(ji.load_model("published"), noise=ji.Noise(position=5e-4, heading=5e-3))
+    >>> inputs = ji.excite(jax.random.key(0), "multilevel", 300, robot.sample_period)
+    >>> log = ji.simulate(robot, inputs, key=jax.random.key(1))
+    >>> setup, rest = log[:200], log[200:]
+    >>> state, step = ji.joint_filter.init(setup, d_max=0.9, memory=5.0), jax.jit(ji.joint_filter.step)
+    >>> for row in zip(rest.t, rest.u_r, rest.u_l, *rest.pose):
+    ...     state, info = step(state, ji.joint_filter.Sample(*row))
+    >>> bool(info.ok)
+    True
 """
 
 from typing import Any, NamedTuple

@@ -42,6 +42,7 @@ def begin_from_run(run: Runs, d_max: Array, law: Law) -> tuple[Belief, Noise, Ro
     return belief, noise, widest, fit.ok & told
 
 
+@jax.jit
 def at_the_end(
     vector: RobotVector, covariance: RobotMatrix, run: Runs, start: Motion, noise: Noise, coupling
 ) -> Belief:

@@ -64,7 +64,7 @@ def fit_twice(beginning: Beginning, runs: Runs, d_max: Array, law: Law, prior: P
     if bool(fit.ok) or law.slip:
         return fit, beginning
     nothing = beginning.estimate._replace(gain=middle_gain(prior), dead_zone=jnp.zeros(2))
-    nothing = nothing._replace(rate=jnp.full(2, RATE))
+    nothing = nothing._replace(rate=jnp.array([RATE, RATE]))  # of `jnp.full` the type is weak: one program more
     middle = beginning._replace(estimate=nothing)
     other = jax.device_get(fit_from(middle, runs, d_max, law, prior))
     least = float(fit.log_likelihood) - (AS_LIKELY if bool(other.ok) else 0.0)

@@ -26,11 +26,16 @@ from jaxident.robot.wheel_sensor import WheelSensor, wheel_rates
 
 
 class Bound(NamedTuple):
-    """The Cramer-Rao bound: no unbiased estimator does better.
+    """The Cramér-Rao bound: no unbiased estimator does better.
 
-    order: names of the physical parameters and the noise law. covariance (n, n) and standard_deviation (n,) in that
-    order; difference_covariance (12, 12) and difference_deviation (12,) in DIFFERENCE_ORDER, to first order. verdicts:
-    one per physical parameter.
+    Attributes:
+        order: names of the physical parameters and the noise law.
+        covariance: (n, n) in that order.
+        standard_deviation: (n,) in that order.
+        difference_order: names of the twelve numbers of (13)-(14) with their dead zones.
+        difference_covariance: (12, 12), to first order.
+        difference_deviation: (12,), to first order.
+        verdicts: whether this input determines each physical parameter.
     """
 
     order: tuple[str, ...]
@@ -43,13 +48,26 @@ class Bound(NamedTuple):
 
 
 def cramer_rao(model: Model, inputs: Log | Sequence[Log], noise: Noise, *, start: State = AT_REST) -> Bound:
-    """The bound for `model` under the commands and times of `inputs` with camera and slip `noise`.
+    """Compute the Cramér-Rao bound: the smallest covariance that an unbiased estimator can have.
 
-    The inverse of the Fisher information by automatic differentiation of the simulator, five start states per run and
-    the noise law counted as unknowns. Rows without a pose count as not measured, unless no row has one. With slip the
-    information is that of the innovations along the path without it. Wheel speeds count where the inputs have them, or
-    at all rows where their columns are empty throughout; the model then needs `wheels`. InputError for a model without
-    physical parameters, a camera or wheel speeds without noise. Needs double precision.
+    The bound is the inverse of the Fisher information, which comes from the simulator by automatic differentiation.
+    Five start states per run and the noise law count as unknowns. With slip the information is that of the innovations
+    along the path without it. Needs double precision.
+
+    Args:
+        model: the robot.
+        inputs: commands and times. Rows without a pose count as not measured, unless no row has one. Wheel speeds count
+            where the inputs have them, or at all rows where their columns are empty throughout.
+        noise: of the camera and of slip; position and heading above 0.
+        start: state at the first row of each run.
+
+    Returns:
+        Bound: covariance and standard deviation of each parameter, in natural units and as difference equations, and
+            whether this input determines the parameter.
+
+    Raises:
+        InputError: a model of free numerators, a camera or wheel speeds without noise, wheel speeds of a model without
+            `wheels`.
 
     Examples:
         >>> import jax, jaxident as ji

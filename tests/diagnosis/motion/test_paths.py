@@ -49,11 +49,17 @@ def log():
     return make_log(t, u[:, 0], u[:, 1], 0.0 * t, 0.0 * t, 0.0 * t)
 
 
+PUSH, TRACK = jax.jit(push_of), jax.jit(track)
+REPORT = jax.jit(lambda vector, pose: report(by_effect(vector), *pose))
+STILL = np.zeros((5, 1))
+
+
 @pytest.fixture(scope="module")
 def follow(log):
     windows = cut(log, ROWS)
-    compiled = jax.jit(lambda vector: report(by_effect(vector), *track(vector, np.zeros((5, 1)), windows).pose))
-    return lambda vector: np.stack([np.asarray(part)[:, 0] for part in compiled(vector)])
+    return lambda vector: np.stack(
+        [np.asarray(part)[:, 0] for part in REPORT(vector, TRACK(vector, STILL, windows).pose)]
+    )
 
 
 def nominal() -> np.ndarray:
@@ -100,17 +106,16 @@ def test_windows_start_where_they_are_told(log):
     """Cut in two, each half from the state that the whole has there, the path is the whole's."""
     whole, halves = cut(log, ROWS), cut(log, ROWS // 2)
     vector = nominal()
-    follow = jax.jit(track)
-    states = np.stack([np.asarray(part)[:, 0] for part in follow(vector, np.zeros((5, 1)), whole)])
+    states = np.stack([np.asarray(part)[:, 0] for part in TRACK(vector, STILL, whole)])
     starts = states[:, [0, ROWS // 2]]
-    parts = np.stack(follow(vector, starts, halves))
+    parts = np.stack(TRACK(vector, starts, halves))
     np.testing.assert_allclose(np.concatenate(parts.transpose(2, 0, 1), axis=1), states, atol=1e-10)
 
 
 def test_unseen_poses_leave_no_residual(log):
     hidden = log._replace(x=np.where(np.arange(ROWS) == 7, np.nan, log.x))
     windows = cut(hidden, ROWS)
-    found = np.asarray(jax.jit(residuals)(nominal(), np.zeros((5, 1)), push_of(nominal(), windows), windows))
+    found = np.asarray(jax.jit(residuals)(nominal(), STILL, PUSH(nominal(), windows), windows))
     assert np.all(found[7] == 0.0)
     assert np.all(np.isfinite(found))
     assert np.any(found[8] != 0.0)
@@ -123,8 +128,7 @@ def test_effects_that_share_pushes_leave_them_as_they_are(log, name):
     typical = CATALOGUE[name].typical() | ({"instant": 2.0} if name == "payload_change" else {})
     for key, value in from_catalogue(name, typical).items():
         vector[PLACES[name, key]] = value
-    pushed = jax.jit(push_of)
-    same = jax.tree.map(np.array_equal, pushed(nominal(), windows), pushed(vector, windows))
+    same = jax.tree.map(np.array_equal, PUSH(nominal(), windows), PUSH(vector, windows))
     assert all(same) == (name not in PUSHING)
 
 

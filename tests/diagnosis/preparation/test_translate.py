@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from jaxident.diagnosis.diagnose import compare_parameters
+from jaxident.diagnosis.decide import compare_parameters
 from jaxident.diagnosis.fit.refit import Solution
 from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.preparation.translate import effect_of, to_model

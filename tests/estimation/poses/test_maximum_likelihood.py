@@ -146,6 +146,7 @@ def test_batch_is_the_loop_and_compiles_once():
     assert compiled._cache_size() == 1
 
 
+@pytest.mark.slow
 def test_a_long_run_is_found_in_few_steps():
     """9 here, median of 16 records 8; 26 and 27 while damping ended at 1e-6, above a long run's flattest direction."""
     fit = jax.jit(lambda runs: fit_runs(runs, D_MAX))(

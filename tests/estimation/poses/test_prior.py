@@ -49,7 +49,9 @@ def runs_of(key, command):
     return Runs(jnp.asarray(PERIOD), Wheels(*(u[None] for u in command)), Pose(*(c[None] for c in pose)), seen)
 
 
-FIT = jax.jit(lambda runs: fit_runs(runs, 0.9))
+def fitted(runs):
+    """The fit as `identify` makes it, in programs that other tests have compiled: a lone `jit` would be one more."""
+    return fit_runs(pad_rows(jax.tree.map(np.asarray, runs)), 0.9)
 
 
 def straight(rows=200, seed=1):
@@ -92,7 +94,7 @@ def test_prior_changes_nothing_where_poses_speak():
 @pytest.mark.slow
 def test_a_robot_that_never_leaves_its_dead_zones_comes_from_the_prior():
     """Its gains and dead zones are the prior's, finite and a robot's, whatever the camera's noise looks like."""
-    fit = FIT(runs_of(jax.random.key(1), Wheels(jnp.full(200, 0.1), jnp.full(200, 0.1))))
+    fit = fitted(runs_of(jax.random.key(1), Wheels(jnp.full(200, 0.1), jnp.full(200, 0.1))))
     assert fit.ok
     assert from_prior(np.asarray(fit.prior_share), Law()) == names(Law())[:8]
     assert np.all(np.isfinite(fit.covariance))
@@ -103,7 +105,7 @@ def test_a_robot_that_never_leaves_its_dead_zones_comes_from_the_prior():
 
 def test_one_constant_command_ends_finite():
     """Poses of one steady command leave a ridge; the search may not arrive, and says so, with a robot's numbers."""
-    fit = FIT(runs_of(jax.random.key(1), Wheels(jnp.full(200, 0.8), jnp.full(200, 0.6))))
+    fit = fitted(runs_of(jax.random.key(1), Wheels(jnp.full(200, 0.8), jnp.full(200, 0.6))))
     assert {"gain_11", "gain_12", "dead_zone_r"} <= set(from_prior(np.asarray(fit.prior_share), Law()))
     assert np.all(np.isfinite(fit.covariance))
     assert np.all(np.isfinite(natural_values(fit.robot, Law())))
@@ -143,7 +145,7 @@ def test_what_hardly_shows_is_arrived_at_in_any_unit():
     fits = []
     for seed, unit in itertools.product((1, 2, 3), np.logspace(-3.0, 3.0, 9)):
         log = straight(seed=seed)
-        runs, d_max = pad_rows(stack_runs(log._replace(u_r=unit * log.u_r, u_l=unit * log.u_l))), 0.72 * unit
+        runs, d_max = pad_rows(stack_runs(log._replace(u_r=unit * log.u_r, u_l=unit * log.u_l))), float(0.72 * unit)
         fits.append(fit_from(begin(runs, d_max), runs, d_max, Law(), prior_of(runs)))
     assert sum(bool(fit.ok) for fit in fits) >= 25
     assert np.mean([fit.steps for fit in fits]) < 30
@@ -154,9 +156,9 @@ def test_what_hardly_shows_is_arrived_at_in_any_unit():
 @pytest.mark.parametrize("law", LAWS, ids=["plain", "full"])
 def test_terms_are_the_derivatives_of_half_the_squares(law):
     at = point(law)
-    value, gradient, curvature = prior_terms(at, law, prior())
-    assert value == pytest.approx(0.5 * float(jnp.sum(departures(at, law, prior()) ** 2)))
-    own = jax.grad(lambda v: 0.5 * jnp.sum(departures(v, law, prior()) ** 2))(at)
+    value, gradient, curvature = jax.jit(lambda v: prior_terms(v, law, prior()))(at)
+    squares, own = jax.jit(jax.value_and_grad(lambda v: 0.5 * jnp.sum(departures(v, law, prior()) ** 2)))(at)
+    assert value == pytest.approx(float(squares))
     np.testing.assert_allclose(gradient, own, rtol=1e-12)
     assert np.all(np.isfinite(gradient))
     assert np.linalg.matrix_rank(curvature) == (10 if law.coupling else 8)

@@ -1,5 +1,6 @@
 """The starter: its products against plain least squares, and start states of the windows."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -23,10 +24,10 @@ def windows():
 @pytest.mark.parametrize("which", [0, 1], ids=["position", "heading"])
 def test_products_are_those_of_what_least_squares_leaves(windows, which):
     """Residuals of every path and of the data after a regression, window by window, on start position and speed."""
-    channel = starter.channels(windows)[which]
+    channel = jax.jit(starter.channels)(windows)[which]
     pull = jnp.asarray(np.random.default_rng(4).normal(size=(ROWS, WINDOWS, 2)))
-    found = starter._products(channel, windows.step, pull, jnp.asarray(RATE))
-    laid = np.asarray(starter._lay(jnp.asarray(RATE), windows.step, pull, channel.direction))
+    found = jax.jit(starter._products)(channel, windows.step, pull, jnp.asarray(RATE))
+    laid = np.asarray(jax.jit(starter._lay)(jnp.asarray(RATE), windows.step, pull, channel.direction))
     expected = np.zeros((3, 3))
     for window in range(WINDOWS):
         seen = np.asarray(windows.seen[window])

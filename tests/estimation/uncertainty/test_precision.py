@@ -1,5 +1,6 @@
 """The Cramer-Rao bound: against finite differences, scaling, what an input cannot show, errors."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -22,11 +23,11 @@ CAMERA = Noise(1e-3, 1e-2)
 def test_bound_is_the_inverse_information_by_finite_differences():
     log = logged(0, rows=120)
 
+    @jax.jit
     def poses(values):
         model = Model(PERIOD, Physical(values[:2], values[2:6].reshape(2, 2)), values[6:8])
-
         state = run_physical(model, log.command, jnp.asarray(PERIOD), State(*values[8:]))
-        return np.concatenate([state.x / 1e-3, state.y / 1e-3, state.theta / 1e-2])
+        return jnp.concatenate([state.x / 1e-3, state.y / 1e-3, state.theta / 1e-2])
 
     centre = np.concatenate([DRIVE.rate, np.ravel(DRIVE.gain), DEAD_ZONE, np.zeros(5)])
     columns = []
