@@ -1,17 +1,16 @@
 """From logs to a model by maximum likelihood on poses."""
 
-from functools import partial
 from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxident.array_types import Array, Pose
+from jaxident.array_types import Pose
 from jaxident.errors import InputError, WorkError
 from jaxident.estimation.poses.maximum_likelihood import Fit, uncertain_as_by
 from jaxident.estimation.poses.noise_law import WHITE, colour, fit_law
-from jaxident.estimation.poses.parameters import Law, Robot, names, to_vector
+from jaxident.estimation.poses.parameters import Law, names, to_vector
 from jaxident.estimation.poses.prior import RATE, from_prior
 from jaxident.estimation.poses.runs import Runs, pad_rows, stack_runs, with_wheels
 from jaxident.estimation.poses.wheel_colour import WHITE_WHEELS, spacing, thinned, wheel_colour
@@ -95,7 +94,7 @@ def _steps(log: Log) -> np.ndarray:
 
 def _model(fit: Fit, law: Law, period: float) -> Model:
     """The estimate as a model with its noise law, covariance and standard deviations."""
-    difference = _difference_covariance(fit.robot, fit.covariance, period, law)
+    difference = difference_covariance(to_vector(fit.robot, law), fit.covariance, period, law)
     noise = fit.robot.noise
     return Model(
         period,
@@ -108,11 +107,6 @@ def _model(fit: Fit, law: Law, period: float) -> Model:
         wheels=None if fit.robot.wheels is None else WheelSensor(*map(float, fit.robot.wheels)),
         provenance=Provenance(method="maximum-likelihood", from_prior=from_prior(np.asarray(fit.prior_share), law)),
     )
-
-
-@partial(jax.jit, static_argnames="law")
-def _difference_covariance(robot: Robot, covariance: Array, period: Array, law: Law) -> Array:
-    return difference_covariance(to_vector(robot, law), covariance, period, law)
 
 
 def _suspicions(fit: Fit, law: Law, runs: Runs, noise_law: str) -> tuple[str, ...]:

@@ -48,6 +48,7 @@ def test_every_row_has_one_role_and_a_third_judges(rows, runs):
         assert {p.run for p in roles.judge} == set(range(1, runs, 3))
 
 
+@pytest.mark.slow
 def test_a_piece_of_a_long_run_drives_as_the_whole_does():
     """A delay, a lag, play and a slew limit remember what was commanded before the piece."""
     rng = np.random.default_rng(1)
@@ -70,11 +71,13 @@ def test_a_piece_of_a_long_run_drives_as_the_whole_does():
 
 @pytest.fixture(scope="module")
 def logs():
-    """Four runs of a robot with a delay, lost commands and outliers."""
+    """Three runs of a robot with a delay, lost commands and outliers; of the size of those in `test_end_to_end`, for
+    both then need the same programs."""
+    period = 1.0 / 30.0
     effects = (Effect("transport_delay", {"delay": 0.08}), Effect(LOST, {"probability": 0.15}),
                Effect("outliers", {"probability": 0.02, "position": 0.02, "heading": 0.2}))  # fmt: skip
-    robot = Model(STEP, ROBOT.dynamics, ROBOT.dead_zone, ROBOT.noise, effects)
-    plain = [excite(jax.random.key(k), "multilevel", 260, STEP, hold=12) for k in range(4)]
+    robot = Model(period, ROBOT.dynamics, ROBOT.dead_zone, ROBOT.noise, effects)
+    plain = [excite(jax.random.key(k), "multilevel", 400, period, hold=10) for k in range(3)]
     runs = [simulate(robot, log, key=jax.random.key(10 + k)) for k, log in enumerate(plain)]
     return [Log(*map(np.asarray, run)) for run in runs]
 

@@ -133,6 +133,7 @@ def test_forward_and_reverse_derivatives_agree(point):
     assert np.isfinite(np.concatenate([np.ravel(leaf) for leaf in by_drive])).all()
 
 
+@pytest.mark.slow
 def test_derivatives_at_neutral_match_differences():
     """One-sided, of second order, where the parameter may not be negative, else central; steps of 1e-5."""
     vector, h = jnp.asarray(NEUTRAL), 1e-5

@@ -45,14 +45,16 @@ def test_noise_free_data_are_recovered(log):
     np.testing.assert_allclose(vector(found), TRUTH, rtol=1e-3)
 
 
-def test_several_logs_are_runs_and_poses_may_be_missing():
-    first, second = made(1), made(2)
+@pytest.mark.parametrize("reading", ["one_step", pytest.param("free_run", marks=pytest.mark.slow)])
+def test_several_logs_are_runs_and_poses_may_be_missing(reading):
+    """Two runs as long together as the one before: the same program."""
+    first, second = (made(seed)[: ROWS // 2] for seed in (1, 2))
     x = first.x.copy()
-    x[50:300:7] = np.nan
+    x[50:250:7] = np.nan
     gaps = first._replace(
         x=x, y=np.where(np.isnan(x), np.nan, first.y), theta=np.where(np.isnan(x), np.nan, first.theta)
     )
-    found = identify([gaps, second], "paper", reading="free_run")
+    found = identify([gaps, second], "paper", reading=reading)
     assert found.ok
     np.testing.assert_allclose(vector(found), TRUTH, rtol=1e-3)
 

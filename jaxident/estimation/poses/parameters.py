@@ -1,7 +1,9 @@
 """The unknowns of the likelihood as one vector, and the noise law that says which of them there are."""
 
+from functools import partial
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array, Unknowns
@@ -61,8 +63,10 @@ def is_logarithmic(law: Law) -> Array:
     return jnp.array([name in _LOGARITHMIC for name in names(law)])
 
 
+@partial(jax.jit, static_argnames="law")
 def to_vector(robot: Robot, law: Law) -> Unknowns:
-    """The vector (unknowns,) of a robot; terms that the law has not are left out."""
+    """The vector (unknowns,) of a robot; terms that the law has not are left out. One program: operation by operation
+    its first call takes a second."""
     coupling = (0.0, 0.0) if robot.drive.coupling is None else robot.drive.coupling
     noise = robot.noise
     time = 1.0 if noise.correlation_time is None else noise.correlation_time

@@ -141,6 +141,7 @@ def bound_covariance(vector: Unknowns, start: StateVector, runs: Runs, law: Law)
     return covariance_at(point, local_at(point, exact, law), law)
 
 
+@partial(jax.jit, static_argnames="law")
 def natural_values(robot: Robot, law: Law) -> Unknowns:
     """The unknowns (unknowns,) of a robot in natural units, in the order of `names(law)`."""
     parts = [*robot.drive.rate, *(g for row in robot.drive.gain for g in row), *robot.dead_zone]
@@ -153,6 +154,7 @@ def natural_values(robot: Robot, law: Law) -> Unknowns:
     return jnp.stack([jnp.asarray(part) for part in parts])
 
 
+@partial(jax.jit, static_argnames="law")
 def difference_covariance(vector: Unknowns, covariance: UnknownsMatrix, period: Array, law: Law) -> DifferenceMatrix:
     """Covariance (12, 12) in DIFFERENCE_ORDER of the hold image at a period [s], carried to first order; the coupling
     is neglected as in the image itself."""

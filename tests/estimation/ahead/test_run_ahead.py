@@ -108,10 +108,11 @@ def standardised(model, log, horizon=30):
     return float(np.mean(square)), float(np.max(square)), int(ahead.run_up.sum())
 
 
-def test_every_effect_alone_starts_where_the_robot_is():
+@pytest.mark.parametrize("names", [SHAPING[::4], pytest.param(SHAPING, marks=pytest.mark.slow)], ids=["some", "all"])
+def test_every_effect_alone_starts_where_the_robot_is(names):
     """Ten starts of each robot, three channels: the mean square is 1 +- 0.26 for white errors. Stiction, to which the
     fast integrator comes within some per cent only, has more; a start that runs away has hundreds."""
-    found = {model.effects[0].name: standardised(model, log) for model, log in driven([(n,) for n in SHAPING])}
+    found = {model.effects[0].name: standardised(model, log) for model, log in driven([(n,) for n in names])}
     assert np.median([mean for mean, _, _ in found.values()]) == pytest.approx(1.0, abs=0.25)
     assert not {name: told for name, told in found.items() if told[0] > (6.0 if name == "stiction" else 2.0)}
     assert not {name: told for name, told in found.items() if told[1] > (100.0 if name == "stiction" else 25.0)}
@@ -145,6 +146,7 @@ def test_a_start_that_does_not_converge_comes_from_a_run_up_and_is_counted():
     assert np.abs(found.x - log.x[rows]).max() < 0.005
 
 
+@pytest.mark.slow
 def test_a_covariance_stays_one_where_poses_are_refused_again_and_again():
     """A camera that has lost the robot for half of the time, twelve rows each: refused poses double the covariance, and
     what rounding made unequal in its two halves with it. Innovations then had negative squares, and a start that was

@@ -41,7 +41,9 @@ def fit(reading):
     return jax.jit(jax.vmap(one))
 
 
-@pytest.fixture(scope="module", params=READINGS)
+@pytest.fixture(
+    scope="module", params=[pytest.param(name, marks=[pytest.mark.slow] * (name == "free_run")) for name in READINGS]
+)
 def reading(request):
     return request.param, fit(request.param)
 

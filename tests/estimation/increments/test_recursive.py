@@ -81,11 +81,11 @@ def test_memory_without_gaps_is_the_general_one():
 
 @pytest.mark.parametrize("missing", [pytest.param(0.0, marks=pytest.mark.slow), 0.3])
 def test_step_row_by_row_equals_the_scan(missing):
-    log = record(samples=300, noise=1e-5, missing=missing)
-    state = recursive.init(log.rows(0, 220), d_max=0.9)
-    estimate, _ = recursive.run(recursive.unpack(state).estimate, recursive.tail(observe_log(log), 219))
+    log = record(samples=160, noise=1e-5, missing=missing)
+    state = recursive.init(log.rows(0, 80), d_max=0.9)
+    estimate, _ = recursive.run(recursive.unpack(state).estimate, recursive.tail(observe_log(log), 79))
     step = jax.jit(partial(recursive.step))  # compilations of its own to count
-    for k in range(220, 300):
+    for k in range(80, 160):
         state, info = step(state, Sample(log.u_r[k], log.u_l[k], log.x[k], log.y[k], log.theta[k]))
     assert step._cache_size() == 1
     assert max(leaf.nbytes for leaf in jax.tree.leaves((state, info))) < 512, "XLA runs it on one thread"

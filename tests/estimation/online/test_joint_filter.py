@@ -121,10 +121,10 @@ def test_output_of_an_uncertain_dead_zone_is_its_mean():
 def test_row_by_row_is_the_scan_and_compiles_once():
     rows = samples(*record(jax.random.key(1), rows=40))
     many, _ = jax.jit(last)(prior(), rows)
-    one = prior()
+    one, own = prior(), jax.jit(partial(step))  # compilations of its own to count
     for k in range(40):
-        one, _ = compiled(one, jax.tree.map(lambda c, k=k: c[k], rows))
-    assert compiled._cache_size() == 1
+        one, _ = own(one, jax.tree.map(lambda c, k=k: c[k], rows))
+    assert own._cache_size() == 1
     for a, b in zip(jax.tree.leaves(one), jax.tree.leaves(many), strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-15)
 
@@ -230,7 +230,8 @@ def absurd(key, rows=300):
     return jax.vmap(one)(together)
 
 
-@pytest.mark.parametrize(("blocks", "trials"), [(1, 4), pytest.param(67, 500, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize(("blocks", "trials"), [(1, 4), (67, 500)])
 def test_no_number_is_lost_without_a_flag(blocks, trials):
     """Slow: 100,500 runs, three a trial, in five minutes of one core."""
     run = jax.jit(jax.vmap(absurd))

@@ -158,12 +158,13 @@ def test_a_long_run_is_found_in_few_steps():
     assert np.abs(error / jnp.sqrt(jnp.diagonal(fit.covariance))[:8]).max() < 4.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("effect", "noise_law"),
     [
-        pytest.param(Effect("lateral_slip", {"slip": 0.03}), "slip", marks=pytest.mark.slow),
+        (Effect("lateral_slip", {"slip": 0.03}), "slip"),
         (Effect("lateral_slip", {"slip": 0.2}), "slip-ar1"),
-        pytest.param(Effect("motor_lag", {"time_constant": 0.1}), "slip-ar1", marks=pytest.mark.slow),
+        (Effect("motor_lag", {"time_constant": 0.1}), "slip-ar1"),
     ],
 )
 def test_a_law_that_is_wrong_arrives_in_few_steps(effect, noise_law):

@@ -18,13 +18,14 @@ from jaxident.robot.noise import Noise
 NOISE = Noise(1e-3, 1e-2)
 
 
-def test_padded_rows_change_nothing_that_a_fit_is_made_of():
-    """Beginning, prior and curvature of two runs, both shorter than a window, with steps of any length."""
-    runs = stack_runs(join([logged(1, NOISE, 90, 0.3), logged(2, NOISE, 150, 0.3)]))
-    law = Law(memory=True)
+@pytest.mark.slow
+@pytest.mark.parametrize(("law", "jitter"), [(Law(), 0.0), (Law(memory=True), 0.3)], ids=["even", "any"])
+def test_padded_rows_change_nothing_that_a_fit_is_made_of(law, jitter):
+    """Beginning, prior and curvature of two runs, both shorter than a window, with steps of one length or any."""
+    runs = stack_runs(join([logged(1, NOISE, 90, jitter), logged(2, NOISE, 150, jitter)]))
     point = Point(to_vector(Robot(DRIVE, DEAD_ZONE, NOISE._replace(correlation_time=0.1)), law), jnp.zeros((2, 5)))
-    parts = jax.jit(lambda own: (begin(own, 0.9), prior_of(own), local_at_best_deviations(point, own, law)))
-    both = [parts(own) for own in (runs, pad_rows(runs))]
+    local = jax.jit(lambda own: (prior_of(own), local_at_best_deviations(point, own, law)))
+    both = [(begin(own, 0.9), *local(own)) for own in (runs, pad_rows(runs))]
     for a, b in zip(*map(jax.tree.leaves, both), strict=True):
         np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9 * float(np.max(np.abs(b))))
 
