@@ -63,6 +63,11 @@ class Here(NamedTuple):
     push: Wheels
 
 
+def value_name(law: int, knot: int) -> str:
+    """What a model's covariance calls the value of a law at one of its knots, both counted from 0."""
+    return f"{DISCOVERED}.{law + 1}.{knot + 1}"
+
+
 def check_discovered(laws: Sequence[Discovered]) -> None:
     """InputError for laws that no program can run: too many, of an unknown kind, or with knots out of order."""
     if len(laws) > MOST_LAWS:
@@ -84,6 +89,10 @@ def check_discovered(laws: Sequence[Discovered]) -> None:
             raise InputError(f"discovered: {len(at)} knots and {np.size(law.value)} values; as many are needed")
         if not (np.all(np.isfinite(at)) and np.all(np.isfinite(law.value)) and np.all(np.diff(at) > 0.0)):
             raise InputError("discovered: knots are out of order, or a number is not finite")
+
+
+IDLE = Discovered(ALONG, "1", "v", np.arange(2.0), np.zeros(2))
+"""A law that does nothing: that of a robot without any in a program that runs laws."""
 
 
 def laws_of(laws: Sequence[Discovered], largest: float = 1.0) -> Laws | None:

@@ -76,7 +76,7 @@ _FREE = ("name", "excitations", "amplitude", "samples", "period", "effects", "ho
 
 
 def read_study(path: Source, *, seed: int = 0) -> Study:
-    """Read a study from a TOML file; models in it are found beside it.
+    r"""Read a study from a TOML file; models in it are found beside it.
 
     Args:
         path: the file.
@@ -204,8 +204,6 @@ def _model(value: Any, where: str, folder: str) -> tuple[Model, str]:
         found = load_model(beside if os.path.exists(beside) else name)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
-    if found.discovered:
-        raise InputError(f"{where}: {name}: discovered: a study does not run discovered laws; take them out")
     return found, name
 
 
@@ -220,7 +218,7 @@ def _scaled(model: Model, point: dict[str, float]) -> Model:
     parts = drive._asdict() | {"dead_zone": model.dead_zone}
     moved = {key: None if v is None else point.get(key, 1.0) * np.asarray(v, float) for key, v in parts.items()}
     width = moved.pop("dead_zone")
-    return Model(model.sample_period, Physical(**moved), width, model.noise, model.effects)
+    return Model(model.sample_period, Physical(**moved), width, model.noise, model.effects, discovered=model.discovered)
 
 
 def _choice(entry: Any, where: str) -> Choice:

@@ -28,8 +28,9 @@ MOST_CELLS = 500
 def bounds(study: Study) -> xarray.DataArray | None:
     """Smallest standard deviation possible on the axes of a summary's cells and `parameter`, in DIFFERENCE_ORDER.
 
-    NaN without noise and where effects are in force, of which no estimator knows. None for a study of more than
-    MOST_CELLS cells at one noise level, or with a camera that makes no error in heading. Needs double precision.
+    NaN without noise and where effects or discovered laws are in force, of which no estimator knows. None for a study
+    of more than MOST_CELLS cells at one noise level, or with a camera that makes no error in heading. Needs double
+    precision.
     """
     require_float64("bounds")
     if not study.heading_per_position > 0.0 or np.prod(study.shape[:-2]) > MOST_CELLS:
@@ -40,7 +41,7 @@ def bounds(study: Study) -> xarray.DataArray | None:
     )
     for place in np.ndindex(study.shape[:-2]):
         at = dict(zip(study.axes, place, strict=False))
-        if study.in_force[at["robot"]][at.get("effect", 0)]:
+        if study.in_force[at["robot"]][at.get("effect", 0)] or study.robots[at["robot"]].model.discovered:
             continue
         levels = np.flatnonzero(noise) if slip else np.flatnonzero(noise)[:1]
         for level in levels:

@@ -11,7 +11,7 @@ import numpy as np
 import xarray
 
 from jaxident.origin import versions as of_packages
-from jaxident.robot.model import DIFFERENCE_ORDER, Effect
+from jaxident.robot.model import DIFFERENCE_ORDER, Discovered, Effect
 from jaxident.study.design import PARTS, Study, check_study
 from jaxident.study.engine import chunks, run_locally
 from jaxident.study.estimators import REASONS, settings_of
@@ -126,7 +126,13 @@ def _parts(model: Any) -> dict[str, Any]:
     lists = {key: None if part is None else np.asarray(part, float).tolist() for key, part in drive._asdict().items()}
     slip = None if noise is None else [float(noise.slip_along), float(noise.slip_heading)]
     plain = lists | {"dead_zone": np.asarray(model.dead_zone, float).tolist(), "slip": slip}
-    return plain | ({"effects": _sizes(model.effects)} if model.effects else {})
+    plain |= {"effects": _sizes(model.effects)} if model.effects else {}
+    return plain | ({"discovered": [_law(law) for law in model.discovered]} if model.discovered else {})
+
+
+def _law(law: Discovered) -> dict[str, Any]:
+    kind = {"acts_on": law.acts_on, "times": law.times, "signal": law.signal}
+    return kind | {"at": np.asarray(law.at, float).tolist(), "value": np.asarray(law.value, float).tolist()}
 
 
 def _sizes(effects: Sequence[Effect]) -> dict[str, dict[str, float]]:

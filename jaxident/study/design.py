@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from jaxident.effects.checks import check_delay, check_effects
+from jaxident.effects.discovered import check_discovered
 from jaxident.errors import InputError
 from jaxident.robot.excitation import EXCITATIONS
 from jaxident.robot.model import Effect, Model, require_physical
@@ -180,6 +181,7 @@ def _check_candidate(candidate: Candidate, where: str, duration: float) -> None:
     try:
         require_physical(candidate.model)
         check_effects(candidate.model.effects)
+        check_discovered(candidate.model.discovered)
         check_delay(candidate.model.effects, duration)
     except InputError as error:
         raise InputError(f"{where}: {error}") from None

@@ -11,10 +11,11 @@ import numpy as np
 
 from jaxident.array_types import Wheels
 from jaxident.effects.catalogue import to_vector
+from jaxident.effects.discovered import IDLE, Laws, laws_of
 from jaxident.numerics import require_float64
 from jaxident.parallel import in_parallel, trials_at_once
 from jaxident.robot.excitation import EXCITATIONS
-from jaxident.robot.model import require_physical
+from jaxident.robot.model import Model, require_physical
 from jaxident.study.design import PARTS, Study
 from jaxident.study.estimators import runs_alone
 from jaxident.study.trial import Cell, Outcome, Plan, Recording, Robot, commands, record, run_trial
@@ -193,4 +194,11 @@ def _robots(study: Study, robot: np.ndarray, effect: np.ndarray) -> Robot:
         np.array(slips, float)[robot] if np.any(np.array(slips, float)) else None,
         np.array([candidate.spread for candidate in study.robots], float).reshape(-1, len(PARTS))[robot],
         None if vectors is None else np.array(vectors, float)[robot, effect],
+        _laws(models, robot) if any(model.discovered for model in models) else None,
     )
+
+
+def _laws(models: Sequence[Model], robot: np.ndarray) -> Laws:
+    """Discovered laws of trials (trials, laws, ...) whose places among the robots are given."""
+    each = [laws_of(model.discovered or (IDLE,)) for model in models]
+    return Laws(*(np.stack(leaves)[robot] for leaves in zip(*each, strict=True)))

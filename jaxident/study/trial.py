@@ -15,6 +15,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import AT_REST, Array, Pose, Wheels
+from jaxident.effects.catalogue import NEUTRAL
 from jaxident.effects.full import disturb, run_undisturbed, substeps_for
 from jaxident.robot.drive import Physical
 from jaxident.robot.excitation import EXCITATIONS
@@ -27,7 +28,7 @@ from jaxident.study.estimators import Choice, estimate, see
 class Robot(NamedTuple):
     """Parts of a robot: rate (2,), gain (2, 2), coupling (2,) or None, dead_zone (2,), slip (2,) along and in heading
     or None; spread (4,): the largest relative departure of each part, drawn anew for each seed; effects (parameters,):
-    the catalogue's vector, or None where no trial of the study has any."""
+    the catalogue's vector, or None where no trial of the study has any; laws: discovered ones, or None likewise."""
 
     rate: Any
     gain: Any
@@ -36,6 +37,7 @@ class Robot(NamedTuple):
     slip: Any
     spread: Any
     effects: Any
+    laws: Any
 
 
 class Cell(NamedTuple):
@@ -101,17 +103,18 @@ def commands(base: Array, cells: Cell, kind: str, samples: int, hold: int) -> Wh
 
 def record(base: Array, cell: Cell, command: Wheels, effects: frozenset[str] = frozenset()) -> Recording:
     """Simulate one trial under given commands (samples,), and let the camera look: by the nominal simulator, or the
-    full one where trials of the study have `effects` (their names)."""
+    full one where trials of the study have `effects` (their names) or discovered laws."""
     key_robot, _, key = seed_keys(base, cell)
     robot = draw_robot(key_robot, cell)
     law = Noise(cell.position, cell.heading, cell.correlation_time)
-    if not effects:
+    if not effects and cell.robot.laws is None:
         unit = draw_noise(key, len(command.right))
         exact = run_physical(robot, command, cell.period, AT_REST, unit).pose
         return Recording(command, observe(exact, law, unit, cell.period), exact, robot)
     t, vector = cell.period * jnp.arange(len(command.right)), cell.robot.effects
+    vector = NEUTRAL if vector is None else vector
     exact = run_undisturbed(robot.dynamics, robot.dead_zone, vector, t, command, AT_REST, noise=robot.noise, key=key,
-                            substeps=substeps_for(effects), parts=effects)  # fmt: skip
+                            substeps=substeps_for(effects), parts=effects, laws=cell.robot.laws)  # fmt: skip
     return Recording(command, disturb(exact, vector, t, noise=law, key=key, parts=effects), exact, robot)
 
 

@@ -136,8 +136,12 @@ def test_every_place_has_a_law_that_was_tried():
     assert {law[0] for law in LAWS} == set(ACTS)
 
 
-def test_what_does_not_run_laws_says_so():
-    from jaxident.diagnosis.planning.next_run import plan
-
-    with pytest.raises(InputError, match="a plan does not run discovered laws"):
-        plan(with_law(*LAWS[0]), ("transport_delay", "motor_lag"))
+def test_a_plan_drives_the_robot_with_its_laws():
+    """The room that it says the path needs is that of the simulator's path, of which the robot without laws needs
+    another."""
+    robot = with_law(*LAWS[0])
+    found = ji.plan(robot, ("transport_delay", "motor_lag"), samples=300, batches=0)
+    path = ji.simulate(robot, found.log)
+    np.testing.assert_allclose(found.area, [np.ptp(path.x), np.ptp(path.y)], rtol=0.02)
+    plain = ji.simulate(dataclasses.replace(robot, discovered=()), found.log)
+    assert np.abs(np.array([np.ptp(plain.x), np.ptp(plain.y)]) / found.area - 1.0).max() > 0.05

@@ -2,15 +2,18 @@
 
 import dataclasses
 
+import jax
 import numpy as np
 import pytest
 from support.studies import ROBOT, SMALL, UNDER_EFFECTS
 
+import jaxident as ji
+from jaxident.robot.model import Discovered
 from jaxident.study.dataset import coordinates, describe, study_arrays
 from jaxident.study.design import Candidate
-from jaxident.study.engine import run_one
+from jaxident.study.engine import cells, run_one
 from jaxident.study.statistics import summarise
-from jaxident.study.trial import Outcome
+from jaxident.study.trial import Outcome, commands, record
 
 
 @pytest.fixture(scope="module")
@@ -67,6 +70,30 @@ def test_a_trial_alone_is_the_trial_in_the_study(under_effects, number):
     outcome = run_one(UNDER_EFFECTS, number)[1]
     for name in outcome._fields:
         np.testing.assert_array_equal(getattr(outcome, name), under_effects[name].isel(at))
+
+
+def recorded(study, robot):
+    """What the camera of one trial sees of a robot of a study: its second noise level, its third seed."""
+    index = np.array([[0], [0], [robot], [0], [0], [1], [2]])
+    where, base = cells(study, index), jax.random.key(study.seed)
+    command = commands(base, where, "staircase", study.samples[0], study.hold)
+    return jax.jit(record)(base, *(jax.tree.map(lambda leaf: leaf[0], part) for part in (where, command)))
+
+
+def test_robots_may_have_discovered_laws():
+    """They move as the simulator says, those without as they do alone, and the law is told with the results."""
+    plain = SMALL.robots[0]
+    law = Discovered("acceleration along", "1", "v", np.linspace(-1.0, 1.0, 5), np.linspace(0.3, 0.1, 5))
+    odd = Candidate("odd", dataclasses.replace(plain.model, discovered=(law,)), plain.spread)
+    study = SMALL._replace(robots=(plain, odd))
+    made, beside, alone = recorded(study, 1), recorded(study, 0), recorded(SMALL, 0)
+    robot = dataclasses.replace(odd.model, dynamics=made.robot.dynamics, dead_zone=made.robot.dead_zone, noise=None)
+    log = ji.make_log(study.period[0] * np.arange(study.samples[0]), *made.command)
+    np.testing.assert_allclose(np.stack(made.exact), np.stack(ji.simulate(robot, log).pose), atol=1e-9)
+    np.testing.assert_allclose(np.stack(beside.exact), np.stack(alone.exact), atol=1e-9)
+    assert np.abs(made.exact.x - beside.exact.x).max() > 0.05
+    assert describe(study)["robots"][1]["discovered"][0]["value"] == law.value.tolist()
+    assert "discovered" not in describe(study)["robots"][0]
 
 
 def test_they_come_on_top_of_what_a_robot_has():

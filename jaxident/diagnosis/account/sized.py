@@ -14,6 +14,11 @@ from jaxident.diagnosis.noise.law import Law, less_slip
 from jaxident.diagnosis.noise.likelihood import Amounts, Sized, sample
 from jaxident.diagnosis.noise.variance_uncertainty import Draws, draw_laws, sizes_by_memory
 from jaxident.diagnosis.preparation.prepare import Prepared
+from jaxident.diagnosis.preparation.translate import slopes_of
+from jaxident.effects.coordinates import COORDINATES
+from jaxident.effects.discovered import ACTS, value_name
+from jaxident.effects.effect import UNIT
+from jaxident.robot.model import Model
 
 REPLAYS = 500
 """Laws of noise, and robots, drawn as likely as the fit leaves them."""
@@ -33,11 +38,25 @@ def sized_corrected(
 
 
 def with_curves(corrected: Corrected, bending: Bending | None, largest: float) -> Corrected:
-    """The corrected model with curves."""
+    """The corrected model with curves, and the covariance of its parameters and the curves' values."""
     if bending is None:
         return corrected
     kept = tuple(as_law(curve, largest) for curve in bending.curves)
-    return corrected._replace(model=dataclasses.replace(corrected.model, discovered=kept))
+    order, covariance = _covariance(bending, corrected.model, largest)
+    model = dataclasses.replace(corrected.model, discovered=kept, parameter_order=order, covariance=covariance)
+    return corrected._replace(model=model)
+
+
+def _covariance(bending: Bending, model: Model, largest: float) -> tuple[tuple[str, ...], np.ndarray]:
+    """Names and covariance of a model's parameters and its curves' values, in the user's units."""
+    effects = [effect for effect in model.effects if effect.name in COORDINATES]
+    names, slope = slopes_of(bending.fit, effects, largest)
+    units = [largest if ACTS[curve.kind.acts_on] == UNIT else 1.0 for curve in bending.curves for _ in curve.at]
+    own, (rows, columns) = len(units), slope.shape
+    whole = np.zeros((rows + own, columns + own))
+    whole[:rows, :columns], whole[rows:, columns:] = slope, np.diag(units)
+    values = [value_name(k, knot) for k, curve in enumerate(bending.curves) for knot in range(len(curve.at))]
+    return (*names, *values), whole @ bending.covariance @ whole.T
 
 
 def beside(finding: Finding, bending: Bending) -> Finding:

@@ -37,10 +37,12 @@ class Curve(NamedTuple):
 
 
 class Bending(NamedTuple):
-    """A fit of the nominal robot, its effects and some curves, and the noise law beside them."""
+    """A fit of the nominal robot, its effects and some curves, the covariance of its free coordinates and then of the
+    curves' values, and the noise law beside them."""
 
     fit: Solution
     curves: tuple[Curve, ...]
+    covariance: Any
     law: Law
 
 
@@ -84,8 +86,9 @@ def smoothness(curves: tuple[Curve, ...]) -> np.ndarray:
     return whole
 
 
-def refit_with(data: Data, fit: Solution, curves: tuple[Curve, ...]) -> tuple[Solution, tuple[Curve, ...]]:
-    """The fit nearest downhill of a fit and curves: nominal parameters, effects, start states and values at knots."""
+def refit_with(data: Data, fit: Solution, curves: tuple[Curve, ...]) -> tuple[Solution, tuple[Curve, ...], np.ndarray]:
+    """The fit nearest downhill of a fit and curves: nominal parameters, effects, start states and values at knots; and
+    the covariance of all but start states."""
     low, high = (bound[fit.places] for bound in limits())
     smooth = smoothness(curves)
     starts, cost = best_starts(data, fit.vector, fit.starts, np.zeros_like(fit.starts), laws_from(curves))
@@ -132,14 +135,16 @@ def _moved(data: Data, now: Solution, curves, around: _Around, step: Array, boun
     return vector, bent, starts, cost + unlikeliness(vector)
 
 
-def _arrived(fit: Solution, curves: tuple[Curve, ...], around: _Around) -> tuple[Solution, tuple[Curve, ...]]:
-    """The fit and its curves with their covariance and deviations."""
+def _arrived(
+    fit: Solution, curves: tuple[Curve, ...], around: _Around
+) -> tuple[Solution, tuple[Curve, ...], np.ndarray]:
+    """The fit and its curves with their deviations, and the covariance of both."""
     own = len(fit.places)
     covariance = covariance_from(around.summed)
     spread = np.sqrt(np.maximum(np.diagonal(covariance)[own:], 0.0))
     pieces = np.split(spread, np.cumsum([len(curve.at) for curve in curves])[:-1])
     found = tuple(curve._replace(deviation=part) for curve, part in zip(curves, pieces, strict=True))
-    return fit._replace(covariance=covariance[:own, :own]), found
+    return fit._replace(covariance=covariance[:own, :own]), found, covariance
 
 
 def _values(curves: tuple[Curve, ...]) -> np.ndarray:

@@ -37,7 +37,7 @@ FEWEST = 8
 def discover(finding: Finding) -> list[Bending]:
     """Fits with one curve, two and so on; none where nothing is worth it. Poses alone judge a curve."""
     windows = finding.data.windows._replace(wheels=None, turning=None)
-    now = Bending(finding.fit, (), finding.law)
+    now = Bending(finding.fit, (), finding.fit.covariance, finding.law)
     found: list[Bending] = []
     while len(windows.run) >= FEWEST and len(found) < MOST_LAWS:
         more = _next(windows, now)
@@ -55,7 +55,7 @@ def _next(windows: Windows, now: Bending) -> Bending | None:
     curve = strongest(data, now.fit, now.curves)
     if curve is None:
         return None
-    fit, curves = refit_with(data, now.fit, (*now.curves, curve))
+    fit, curves, _ = refit_with(data, now.fit, (*now.curves, curve))
     responses = respond(np.exp(fit.vector[:2]), fit.linear.residual, windows)
     law = size_noise(fit.linear.residual, fit.linear.starts, windows, responses, LIKELY)
     return Bending(*refit_with(whiten(fit, windows, law)[0], fit, curves), law)

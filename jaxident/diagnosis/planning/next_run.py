@@ -21,7 +21,7 @@ from jaxident.diagnosis.noise.law import whitener_of
 from jaxident.diagnosis.planning.question import Question, ask, check_names, expected_size, noise_of
 from jaxident.diagnosis.planning.trial_inputs import ORDINARY, draw, make, vary
 from jaxident.effects.coordinates import NOMINAL
-from jaxident.errors import InputError
+from jaxident.effects.discovered import check_discovered
 from jaxident.log import Log, make_log
 from jaxident.numerics import require_float64
 from jaxident.robot.model import Model
@@ -68,7 +68,7 @@ def plan(
     are drawn, then new ones are made from the best. The same seed gives the same plan. Needs double precision.
 
     Args:
-        model: the robot. Its other effects act throughout.
+        model: the robot. Its other effects and its discovered laws act throughout.
         effects: names of the two effects. Each has the size that the model gives it, otherwise the catalogue's typical
             one, with the limit as the unit of the command.
         samples: rows of the input.
@@ -82,7 +82,7 @@ def plan(
 
     Raises:
         InputError: names that cannot be separated, a model of free numerators, a limit inside the dead zones, too few
-            samples, discovered laws.
+            samples.
 
     Examples:
         >>> import jaxident as ji
@@ -93,8 +93,7 @@ def plan(
     """
     require_float64("plan")
     check_names(effects)
-    if model.discovered:
-        raise InputError("discovered: a plan does not run discovered laws; take them out of the model")
+    check_discovered(model.discovered)
     noise, assumed = noise_of(model)
     sizes = {name: expected_size(model, name, limit, samples) for name in effects}
     question = ask(model, effects, sizes, noise, samples, limit)
@@ -113,7 +112,7 @@ def plan(
         best = np.argsort(-found, kind="stable")[:KEPT]
         pool, values = [both[k] for k in best], found[best]
     command = limit * pool[0]
-    path = _paths(question.base, uncut(np.stack(pool), question.period))
+    path = _paths(question, uncut(np.stack(pool), question.period))
     area = (float(np.ptp(path[0, :, 0])), float(np.ptp(path[1, :, 0])))
     log = make_log(question.period * np.arange(samples), command[:, 0], command[:, 1])
     return Plan(log, before, float(values[0]), sizes, noise, assumed, area)
@@ -122,15 +121,16 @@ def plan(
 def separations(question: Question, commands: Array) -> np.ndarray:
     """The separation (inputs,) that each of some commands (inputs, samples, 2) over the limit would give."""
     count, samples, _ = commands.shape
-    states = _paths(question.base, uncut(commands, question.period))
+    states = _paths(question, uncut(commands, question.period))
     x, y, theta = (states[k].T.ravel() for k in range(3))
     t, run = np.tile(question.period * np.arange(samples), count), np.repeat(np.arange(count), samples)
     right, left = commands.reshape(-1, 2).T
     log = make_log(t, right, left, x, y, theta, run)
     windows = cut(log, question.rows)._replace(session=np.zeros(count))
     starts = states[:, windows.first, windows.run]
-    linear = linearise(question.base, starts, windows, list(range(len(NOMINAL))))
-    moved = follow(question.vectors, np.broadcast_to(starts, (len(question.vectors), *starts.shape)), windows)
+    linear = linearise(question.base, starts, windows, list(range(len(NOMINAL))), question.laws)
+    lanes = np.broadcast_to(starts, (len(question.vectors), *starts.shape))
+    moved = follow(question.vectors, lanes, windows, question.laws)
     columns = np.concatenate([linear.slopes, np.moveaxis(linear.residual - moved, 0, -1)], axis=2)
     products = gram(_whitener(question, linear.residual, windows), columns, linear.starts).products
     return np.array([_separation(question, products[windows.run == run].sum(axis=0)) for run in range(count)])
@@ -159,6 +159,6 @@ def _whitener(question: Question, residual: Array, windows: Windows) -> np.ndarr
 _track = jax.jit(track)
 
 
-def _paths(base: Array, whole: Windows) -> np.ndarray:
-    """States (5, samples, inputs) of the robot from rest at the origin."""
-    return np.stack(_track(base, np.zeros((START_STATES, len(whole.run))), whole))
+def _paths(question: Question, whole: Windows) -> np.ndarray:
+    """States (5, samples, inputs) of the robot without the two effects, from rest at the origin."""
+    return np.stack(_track(question.base, np.zeros((START_STATES, len(whole.run))), whole, question.laws))

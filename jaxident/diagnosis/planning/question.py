@@ -21,6 +21,7 @@ from jaxident.effects.coordinates import (
     seeds,
     unit_factors,
 )
+from jaxident.effects.discovered import Laws, laws_of
 from jaxident.errors import InputError
 from jaxident.robot.model import Model, require_physical
 from jaxident.robot.noise import Noise
@@ -34,7 +35,7 @@ SCALES = (0.25, 0.5, 1.0, 2.0)
 class Question(NamedTuple):
     """What inputs are judged for, commands over the limit: the robot without the two effects (SIZE,); vectors
     (n, SIZE) with them; for each effect the place among these of its expected size, and its rays, lists of places that
-    are fitted together; the noise law, sample period [s] and rows of a window."""
+    are fitted together; the noise law, sample period [s] and rows of a window; discovered laws of the robot."""
 
     base: Any
     vectors: Any
@@ -43,6 +44,7 @@ class Question(NamedTuple):
     law: Law
     period: float
     rows: int
+    laws: Laws | None = None
 
 
 def check_names(effects: tuple[str, ...]) -> None:
@@ -119,7 +121,7 @@ def ask(
         own = _points(name, size, samples * period)
         rays.append([_ray(vectors, base, name, point) for point in own])
     return Question(base, np.stack(vectors), (expected[0], expected[1]), (rays[0], rays[1]), law_of(noise, period),
-                    period, rows)  # fmt: skip
+                    period, rows, laws_of(model.discovered, limit))  # fmt: skip
 
 
 def _inner(name: str, parameters: dict[str, Any], limit: float) -> dict[str, float]:

@@ -1,5 +1,7 @@
 """Between the coordinates of a search, for commands over their largest, and models in the user's unit."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from jaxident.array_types import Array
@@ -114,8 +116,14 @@ def _effect(name: str, vector: Array, largest: float, fit: Solution | None) -> E
 
 
 def covariance_of(fit: Solution, effects: list[Effect], largest: float) -> tuple[tuple[str, ...], np.ndarray]:
-    """Names and covariance of the parameters of a fit in the user's units, those of effects as effect.parameter; to
-    first order, without those that were looked for on a grid alone."""
+    """Names and covariance of the parameters of a fit in the user's units, to first order; see `slopes_of`."""
+    names, slope = slopes_of(fit, effects, largest)
+    return names, slope @ fit.covariance @ slope.T
+
+
+def slopes_of(fit: Solution, effects: Sequence[Effect], largest: float) -> tuple[tuple[str, ...], np.ndarray]:
+    """Names of the parameters of a fit in the user's units, those of effects as effect.parameter, and how they answer
+    to its free coordinates (parameters, coordinates); without those that were looked for on a grid alone."""
     names = [*NOMINAL, *(f"{effect.name}.{key}" for effect in effects for key in effect.parameters)]
 
     def values(vector: Array) -> np.ndarray:
@@ -129,8 +137,7 @@ def covariance_of(fit: Solution, effects: list[Effect], largest: float) -> tuple
         columns.append((values(moved) - here) / step)
     slope = np.stack(columns, axis=1)
     told = np.any(slope != 0.0, axis=1)
-    matrix = slope[told] @ fit.covariance @ slope[told].T
-    return tuple(name for name, kept in zip(names, told, strict=True) if kept), matrix
+    return tuple(name for name, kept in zip(names, told, strict=True) if kept), slope[told]
 
 
 def noise_of(law: Law, apart: bool = False) -> Noise:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from jaxident.array_types import Array
+from jaxident.effects.discovered import value_name
 from jaxident.robot.drive import Physical
 from jaxident.robot.model import Model, require_physical
 
@@ -38,14 +39,15 @@ def _roots(covariance: Array) -> np.ndarray:
 
 def _sizes(names: list[str], values: Array) -> np.ndarray:
     """Typical sizes (n,) of parameters: their own, or that of the largest of their kind where they are next to
-    nothing."""
-    kinds = [name.rsplit("_", 1)[0] if "." not in name else name for name in names]
+    nothing. Values of a discovered law are of one kind."""
+    kinds = [name if name.count(".") == 1 else name.replace(".", "_").rsplit("_", 1)[0] for name in names]
     largest = {kind: max(abs(v) for k, v in zip(kinds, values, strict=True) if k == kind) for kind in kinds}
     return np.array([max(largest[kind], 1e-6) for kind in kinds])
 
 
 def parameter_values(model: Model) -> dict[str, float]:
-    """The parameters of a physical model by name: rate_1, gain_12, dead_zone_r, coupling_1, and effect.parameter."""
+    """The parameters of a physical model by name: rate_1, gain_12, dead_zone_r, coupling_1, effect.parameter, and
+    `value_name` of discovered laws."""
     drive = require_physical(model)
     coupling = (0.0, 0.0) if drive.coupling is None else drive.coupling
     rows: Mapping[str, Array] = {
@@ -55,7 +57,8 @@ def parameter_values(model: Model) -> dict[str, float]:
         "coupling_1": coupling[0], "coupling_2": coupling[1],
     }  # fmt: skip
     effects = {f"{e.name}.{key}": value for e in model.effects for key, value in e.parameters.items()}
-    return {name: float(value) for name, value in (dict(rows) | effects).items()}
+    laws = {value_name(k, n): value for k, law in enumerate(model.discovered) for n, value in enumerate(law.value)}
+    return {name: float(value) for name, value in (dict(rows) | effects | laws).items()}
 
 
 def with_values(model: Model, changed: Mapping[str, float]) -> Model:
@@ -70,5 +73,9 @@ def with_values(model: Model, changed: Mapping[str, float]) -> Model:
         dataclasses.replace(e, parameters={key: value[f"{e.name}.{key}"] for key in e.parameters})
         for e in model.effects
     )  # fmt: skip
+    laws = tuple(
+        dataclasses.replace(law, value=np.array([value[value_name(k, n)] for n in range(len(law.at))]))
+        for k, law in enumerate(model.discovered)
+    )
     dead_zone = np.array([value["dead_zone_r"], value["dead_zone_l"]])
-    return dataclasses.replace(model, dynamics=drive, dead_zone=dead_zone, effects=effects)
+    return dataclasses.replace(model, dynamics=drive, dead_zone=dead_zone, effects=effects, discovered=laws)

@@ -68,17 +68,14 @@ def run_ahead(model: Model, log: Log, starts: Starts, horizon: int, *, burn_in: 
     lost = chance[BY_CHANCE["lost"]]["probability"] if BY_CHANCE["lost"] in chance else None
     filler = -(first + 1 + horizon) % ROWS
     stretch = cut_stretches(log, starts, first - before, before, horizon + filler, session_time)
-    ahead, laws = slice(first + 1, first + 1 + horizon), laws_of(model.discovered)
+    ahead = slice(first + 1, first + 1 + horizon)
 
-    def run(vector: Array, stretch: Stretch) -> Run:
-        return _in_blocks(vector, laws, noise, lost, stretch, first)
+    def run(robot: Model, stretch: Stretch) -> Run:
+        return _in_blocks(vector_of(robot), laws_of(robot.discovered), noise, lost, stretch, first)
 
-    found, run_up = _filtered(partial(run, vector_of(model)), stretch, ahead, burn_in)
+    found, run_up = _filtered(partial(run, model), stretch, ahead, burn_in)
     pose, begin, slip = (np.moveaxis(leaf[ahead], -1, 0) for leaf in found[:3])
-    slopes = [
-        (np.moveaxis(run(vector_of(other), stretch).pose[ahead], -1, 0) - pose) / size
-        for other, size in directions(model)
-    ]
+    slopes = [(np.moveaxis(run(other, stretch).pose[ahead], -1, 0) - pose) / size for other, size in directions(model)]
     return Ahead(pose, begin, slip, np.array(slopes).reshape(-1, *pose.shape), run_up)
 
 

@@ -1,0 +1,73 @@
+"""Robots as likely as a covariance says: their directions add up to it, and predictions spread as the robots do."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import jaxident as ji
+from jaxident.effects.discovered import value_name
+from jaxident.estimation.ahead.parameter_spread import directions, parameter_values, with_values
+from jaxident.estimation.ahead.run_ahead import run_ahead
+from jaxident.estimation.ahead.stretches import every
+from jaxident.robot.drive import Physical
+from jaxident.robot.model import Discovered, Effect, Model
+from jaxident.robot.noise import Noise
+
+STEP, ROWS = 1.0 / 30.0, 300
+SPEEDS = np.linspace(-0.5, 0.5, 5)
+LAW = Discovered("acceleration along", "1", "v", SPEEDS, -0.4 * SPEEDS * np.abs(SPEEDS))
+DRIVE = Physical(np.array([3.0, 5.0]), np.array([[0.8, 0.78], [9.0, -9.2]]), np.zeros(2))
+
+
+def uncertain() -> Model:
+    """A robot with an effect and a discovered law: rates, the effect's size and the law's values are known together."""
+    order = ("rate_1", "motor_lag.time_constant", *(value_name(0, knot) for knot in range(5)))
+    root = np.random.default_rng(0).normal(size=(len(order), len(order)))
+    size = np.array([0.05, 0.002, *[0.05] * 5])
+    covariance = root @ root.T / len(order) * size * size[:, None]
+    return Model(STEP, DRIVE, np.array([0.08, 0.1]), Noise(3e-4, 2e-3), (Effect("motor_lag", {"time_constant": 0.05}),),
+                 covariance=covariance, parameter_order=order, discovered=(LAW,))  # fmt: skip
+
+
+def numbers(model: Model) -> np.ndarray:
+    values = parameter_values(model)
+    return np.array([values[name] for name in uncertain().parameter_order])
+
+
+def test_directions_add_up_to_the_covariance():
+    model = uncertain()
+    moved = np.array([(numbers(other) - numbers(model)) / size for other, size in directions(model)])
+    scale = np.sqrt(np.diagonal(model.covariance))
+    np.testing.assert_allclose(moved.T @ moved / scale / scale[:, None], model.covariance / scale / scale[:, None],
+                               atol=1e-6)  # fmt: skip
+
+
+def test_values_that_are_set_are_there():
+    changed = with_values(uncertain(), {value_name(0, 3): 0.7, "rate_1": 2.0})
+    assert changed.discovered[0].value[3] == 0.7
+    assert changed.physical.rate[0] == 2.0
+    np.testing.assert_array_equal(np.delete(changed.discovered[0].value, 3), np.delete(LAW.value, 3))
+
+
+@pytest.mark.slow
+def test_predictions_spread_as_robots_do():
+    """Against 300 robots drawn from the covariance: a standard deviation has a standard error of 4 %."""
+    model, rng = uncertain(), np.random.default_rng(1)
+    u = np.repeat(rng.uniform(-1.0, 1.0, (ROWS // 15, 2)), 15, axis=0)
+    log = ji.simulate(model, ji.make_log(STEP * np.arange(ROWS), *u.T))
+    log = type(log)(*map(np.asarray, log))
+    starts = every(log, 20, 60)
+    starts = type(starts)(*(column[starts.row + 30 < ROWS] for column in starts))
+
+    def ends(robot: Model) -> np.ndarray:
+        return run_ahead(robot, log, starts, 30, burn_in=20, session_time=0.0).pose[:, -1]
+
+    bare = dataclasses.replace(model, covariance=None, parameter_order=())
+    draws = rng.multivariate_normal(numbers(model), model.covariance, 300)
+    found = np.array([ends(with_values(bare, dict(zip(model.parameter_order, each, strict=True)))) for each in draws])
+    told = run_ahead(model, log, starts, 30, burn_in=20, session_time=0.0).parameters[:, :, -1]
+    np.testing.assert_allclose(np.sqrt(np.sum(told**2, axis=0)), found.std(axis=0), rtol=0.2)
+    bare = dataclasses.replace(model, covariance=model.covariance[:2, :2], parameter_order=model.parameter_order[:2])
+    without = run_ahead(bare, log, starts, 30, burn_in=20, session_time=0.0).parameters[:, :, -1]
+    assert np.sum(without[..., :2] ** 2) < 0.5 * np.sum(told[..., :2] ** 2)  # else the law's values would not be seen
