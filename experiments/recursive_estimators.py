@@ -23,7 +23,7 @@ from experiments.diagonal import DRIVE, PERIOD, TRUTH
 from jaxident.array_types import AT_REST, Wheels
 from jaxident.estimation.increments import recursive
 from jaxident.estimation.increments.initialise import initialise
-from jaxident.estimation.increments.observations import observe_log
+from jaxident.estimation.increments.observations import observe_log, tail
 from jaxident.estimation.increments.regressors import key_terms
 from jaxident.estimation.online import joint_filter
 from jaxident.estimation.poses.parameters import Law, Robot, to_vector
@@ -86,7 +86,7 @@ def least_squares(command, pose, forgetting):
     early = jax.tree.map(lambda c: c[: SETUP - 1], observations)
     setup = initialise(early, d_max=D_MAX, reading="free_run")
     first = recursive.start(setup.difference, setup.dead_zone, early, D_MAX, forgetting)
-    _, (steps, _) = recursive.run(first, recursive.tail(observations, SETUP - 1))
+    _, (steps, _) = recursive.run(first, tail(observations, SETUP - 1))
     return jax.vmap(lambda one: difference_vector(*recursive.parameters(one)))(steps)
 
 

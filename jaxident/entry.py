@@ -15,7 +15,7 @@ A robot with camera noise, its log, its model, and how well that model predicts:
     >>> prediction = ji.predict(found.model, log, horizon=30)
     >>> print(prediction)
     19 free runs of 1 s, 19 end at a measured pose
-    error there: 1.08 mm and ... mrad root mean square, ...
+    error there: 1.1 mm and ... mrad root mean square, ...
 
 What the model misses takes a minute, and several runs:
 

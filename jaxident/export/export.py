@@ -93,8 +93,8 @@ def export(
         >>> import jaxident as ji
         >>> ji.start_jax()
         >>> found = ji.export(ji.load_model("published"), "python")
-        >>> [part.name for part in found.parts]
-        ...
+        >>> found.parts[0].name, found.parts[0].how
+        ('gain', 'field')
     """
     if to not in TARGETS:
         raise InputError(f"unknown target {to!r}; there are {', '.join(TARGETS)}")

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 from jaxident.array_types import AT_REST, Array, Pose, Wheels
 from jaxident.estimation.increments import recursive
 from jaxident.estimation.increments.initialise import Setup, initialise
-from jaxident.estimation.increments.observations import Observations, complete_observations, observe_log
+from jaxident.estimation.increments.observations import Observations, complete_observations, observe_log, tail
 from jaxident.estimation.poses.maximum_likelihood import Fit, fit_runs
 from jaxident.estimation.poses.runs import Runs
 from jaxident.log import Log, make_log
@@ -125,7 +125,7 @@ def trial(robot: Model, key: Array, samples: int = TRIAL_SAMPLES) -> tuple[Array
     observations = complete_observations(command, path_length(pose))
     early = jax.tree.map(lambda column: column[: SETUP_ROWS - 2], observations)
     first = recursive.start(setup.difference, setup.dead_zone, early, D_MAX, 1.0)
-    last = recursive.run_to_end(first, recursive.tail(observations, SETUP_ROWS - 2))
+    last = recursive.run_to_end(first, tail(observations, SETUP_ROWS - 2))
     return difference_vector(*recursive.parameters(last)), setup.ok
 
 

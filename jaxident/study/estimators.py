@@ -21,7 +21,7 @@ from jaxident.estimation.increments.initialise import Setup, initialise
 from jaxident.estimation.increments.input_forms import NAMES, reading_of, usable
 from jaxident.estimation.increments.instrumental import fit_instrumental
 from jaxident.estimation.increments.key_term_fit import Batch, fit_key_terms
-from jaxident.estimation.increments.observations import Observations, complete_observations, observe_log
+from jaxident.estimation.increments.observations import Observations, complete_observations, observe_log, tail
 from jaxident.estimation.increments.projection import project
 from jaxident.estimation.poses.maximum_likelihood import fit_runs
 from jaxident.estimation.poses.parameters import Law, to_vector
@@ -157,7 +157,7 @@ def recursively(sight: Sight, settings: dict[str, Any]) -> Finding:
     rows = len(sight.log.t)
     count = settings["setup_samples"] or max(SETUP_SAMPLES, int(SETUP_SHARE * rows))
     first, setup, variance = _start(sight, settings, count, settings["forgetting"])
-    late = recursive.tail(sight.observations, min(rows, count) - 2)
+    late = tail(sight.observations, min(rows, count) - 2)
     if not len(late.command.right):
         return _finding(first, setup, variance, batch_covariance)
 

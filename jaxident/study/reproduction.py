@@ -13,7 +13,7 @@ from jaxident.array_types import AT_REST, Array, Pose, Wheels
 from jaxident.estimation.identify import Identification, identify
 from jaxident.estimation.increments import recursive
 from jaxident.estimation.increments.initialise import initialise
-from jaxident.estimation.increments.observations import observe_log
+from jaxident.estimation.increments.observations import observe_log, tail
 from jaxident.estimation.predict import Prediction, predict
 from jaxident.log import Log
 from jaxident.robot.dead_zone import effective_command
@@ -150,7 +150,7 @@ def _estimate_all(log: Log, level: Array, unit: UnitNoise) -> tuple[Array, Array
     early = jax.tree.map(lambda column: column[: SETUP_ROWS - 1], observations)
     setup = initialise(early, d_max=D_MAX, reading="one_step")
     first = recursive.start(setup.difference, setup.dead_zone, early, D_MAX, 1.0)
-    last = recursive.run_to_end(first, recursive.tail(observations, SETUP_ROWS - 1))
+    last = recursive.run_to_end(first, tail(observations, SETUP_ROWS - 1))
     batch = difference_vector(setup.difference, setup.dead_zone)
     final = difference_vector(*recursive.parameters(last))
     ok = jnp.stack([setup.ok, setup.ok & jnp.all(jnp.isfinite(final))])

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxident.estimation.increments import recursive
-from jaxident.estimation.increments.observations import observe_log
+from jaxident.estimation.increments.observations import observe_log, tail
 from jaxident.log import Log
 from jaxident.robot.difference import Difference
 from jaxident.robot.excitation import multilevel
@@ -48,4 +48,4 @@ def started(log, rows, difference=ROBOT, forgetting=1.0):
     observations = observe_log(log)
     early = jax.tree.map(lambda c: c[: rows - 1], observations)
     estimate = recursive.start(difference, DEAD_ZONE, early, 0.9, forgetting)
-    return estimate, recursive.tail(observations, rows - 1)
+    return estimate, tail(observations, rows - 1)

@@ -84,3 +84,8 @@ def blind(log: Log, rows: Any) -> Log:
 def poses_only(log: Log) -> Log:
     """The log without wheel speeds."""
     return log if log.wheel_r is None else log._replace(wheel_r=None, wheel_l=None)
+
+
+def tail(observations: Observations, first: int) -> Observations:
+    """The samples from index `first` on."""
+    return jax.tree.map(lambda column: column[first:], observations)

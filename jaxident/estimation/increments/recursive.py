@@ -7,12 +7,10 @@ Examples:
     >>> ji.start_jax()
     >>> robot = ji.load_model("published")
     >>> log = ji.simulate(robot, ji.excite(jax.random.key(0), "multilevel", 300, robot.sample_period))
-    >>> setup, rest = log[:200], log[200:]
-    >>> state, step = ji.recursive.init(setup, d_max=0.9), jax.jit(ji.recursive.step)
+    >>> state, rest = ji.recursive.init(log[:200], d_max=0.9), log[200:]
     >>> for row in zip(rest.u_r, rest.u_l, *rest.pose):
-    ...     state, info = step(state, ji.recursive.Sample(*row))
-    >>> difference, dead_zone = ji.recursive.parameters(ji.recursive.unpack(state).estimate)
-    >>> dead_zone.round(2).tolist()
+    ...     state, info = jax.jit(ji.recursive.step)(state, ji.recursive.Sample(*row))
+    >>> ji.recursive.parameters(ji.recursive.unpack(state).estimate)[1].round(2).tolist()
     [0.25, 0.2]
 """
 
@@ -25,7 +23,7 @@ import jax.numpy as jnp
 from jaxident.array_types import Array, Increment, Pose, Wheels
 from jaxident.estimation.increments.initialise import initialise
 from jaxident.estimation.increments.least_squares import LOWER, Equation, equation_from, update
-from jaxident.estimation.increments.observations import Observations, observe_log
+from jaxident.estimation.increments.observations import Observations, observe_log, tail
 from jaxident.estimation.increments.regressors import UNKNOWNS, Memory, Vector, empty_memory, next_row
 from jaxident.log import Log, require_log
 from jaxident.numerics import require_float64, safe_divide
@@ -220,11 +218,6 @@ def parameters(estimate: Estimate) -> tuple[Difference, Array]:
     rows = jnp.stack([jnp.stack(e.unknowns, axis=-1) for e in (estimate.length, estimate.turn)], axis=-2)
     difference = Difference(rows[..., 0], rows[..., (1, 4)], -rows[..., (3, 6)])
     return difference, jnp.stack(estimate.dead_zone, axis=-1)
-
-
-def tail(observations: Observations, first: int) -> Observations:
-    """The samples from index `first` on."""
-    return jax.tree.map(lambda column: column[first:], observations)
 
 
 def _unknowns(difference: Difference, row: int, width: Wheels) -> Vector:

@@ -11,7 +11,7 @@ from support.recursion import DEAD_ZONE, PERIOD, ROBOT, record, started
 from jaxident.array_types import Increment, Wheels
 from jaxident.estimation.increments import recursive
 from jaxident.estimation.increments.least_squares import LOWER, Equation, full_covariance, update
-from jaxident.estimation.increments.observations import observe_log
+from jaxident.estimation.increments.observations import observe_log, tail
 from jaxident.estimation.increments.recursive import Sample
 from jaxident.estimation.increments.regressors import Memory, dot, empty_memory, key_terms, next_row
 from jaxident.log import make_log
@@ -69,8 +69,8 @@ def test_memory_without_gaps_is_the_general_one():
     log = record(samples=60)
     general = observe_log(log)
     plain = general._replace(seen=None, measured=None, first=None, inside=None)
-    full, _ = recursive.run(recursive.start(ROBOT, DEAD_ZONE, general, 0.9, 1.0), recursive.tail(general, 30))
-    short, _ = recursive.run(recursive.start(ROBOT, DEAD_ZONE, plain, 0.9, 1.0), recursive.tail(plain, 30))
+    full, _ = recursive.run(recursive.start(ROBOT, DEAD_ZONE, general, 0.9, 1.0), tail(general, 30))
+    short, _ = recursive.run(recursive.start(ROBOT, DEAD_ZONE, plain, 0.9, 1.0), tail(plain, 30))
     assert isinstance(short.memory, Memory)
     np.testing.assert_allclose(
         np.concatenate([np.ravel(x) for x in jax.tree.leaves(recursive.parameters(full))]),
@@ -83,7 +83,7 @@ def test_memory_without_gaps_is_the_general_one():
 def test_step_row_by_row_equals_the_scan(missing):
     log = record(samples=160, noise=1e-5, missing=missing)
     state = recursive.init(log.rows(0, 80), d_max=0.9)
-    estimate, _ = recursive.run(recursive.unpack(state).estimate, recursive.tail(observe_log(log), 79))
+    estimate, _ = recursive.run(recursive.unpack(state).estimate, tail(observe_log(log), 79))
     step = jax.jit(partial(recursive.step))  # compilations of its own to count
     for k in range(80, 160):
         state, info = step(state, Sample(log.u_r[k], log.u_l[k], log.x[k], log.y[k], log.theta[k]))
@@ -151,6 +151,6 @@ def test_forgetting_follows_a_gain_that_falls():
     errors = []
     for forgetting in (1.0, 0.98):
         first = recursive.start(ROBOT, DEAD_ZONE, early, 0.9, forgetting)
-        last = jax.jit(recursive.run_to_end)(first, recursive.tail(observations, 199))
+        last = jax.jit(recursive.run_to_end)(first, tail(observations, 199))
         errors.append(abs(float(last.turn.unknowns[1]) / (0.8 * 0.0341) - 1.0))
     assert errors[1] < 0.02 < errors[0]
