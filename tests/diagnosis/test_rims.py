@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from support.small_robot import ROWS, RUNS, STEP, VECTOR, robot_with
+from support.small_robot import ROWS, RUNS, STEP, VECTOR, robot_with, windows_of
 
 import jaxident as ji
 from jaxident.diagnosis.causes.finding import find_effects
@@ -157,8 +157,7 @@ def test_a_window_without_wheel_speeds_counts_for_nothing(windows):
 
 
 def test_logs_without_the_columns_have_no_rims():
-    t = np.arange(60) * STEP
-    windows = cut(make_log(t, np.sin(t), np.cos(t), t, 0.0 * t, 0.0 * t), 30)
+    windows = windows_of(VECTOR)
     assert windows.wheels is None
     assert windows.turning is None
     linear = linearise(VECTOR, first_starts(windows), windows, [0])

@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from support.effect_robots import DRIVE, ROBOT, START, WIDTH, drive_log, full, poses, typical
+from support.effect_robots import DRIVE, ROBOT, START, WIDTH, drive_log, full, full_program, poses, typical
 
 import jaxident as ji
 from jaxident.effects import CATALOGUE, NEUTRAL, ORDER, run_full, to_vector
@@ -25,7 +25,7 @@ RATES = [names for names in ORDER if CATALOGUE[names[0]].smooth and not CATALOGU
 
 
 @pytest.mark.parametrize("even", [True, False], ids=["even", "uneven"])
-@pytest.mark.parametrize("coupled", [True, False], ids=["coupled", "uncoupled"])
+@pytest.mark.parametrize("coupled", [True, pytest.param(False, marks=pytest.mark.slow)], ids=["coupled", "uncoupled"])
 def test_full_is_nominal_at_neutral(even, coupled):
     drive = DRIVE if coupled else DRIVE._replace(coupling=None)
     log = drive_log(81, even)
@@ -71,6 +71,7 @@ def movement(pose):
     return {"along": cosine * dx + sine * dy, "lateral": cosine * dy - sine * dx, "heading": np.diff(theta)}
 
 
+@pytest.mark.slow
 def test_heading_is_untouched_by_along_effects_without_coupling():
     drive = DRIVE._replace(coupling=None)
     base = full(jnp.asarray(NEUTRAL), SHORT, drive=drive)
@@ -84,7 +85,7 @@ def test_heading_is_untouched_by_along_effects_without_coupling():
 def test_all_pairs_compose_in_one_program():
     key = jax.random.key(0)
     full(jnp.asarray(NEUTRAL), SHORT, key)
-    compiled = full._cache_size()
+    compiled = full_program._cache_size()
     vectors = [
         to_vector([Effect(name, CATALOGUE[name].typical()) for name in pair])
         for pair in itertools.combinations(CATALOGUE, 2)
@@ -93,7 +94,7 @@ def test_all_pairs_compose_in_one_program():
     assert np.isfinite(many).all()
     for vector in vectors[::40]:
         full(vector, SHORT, key)
-    assert full._cache_size() == compiled
+    assert full_program._cache_size() == compiled
 
 
 @pytest.mark.slow  # in the usual tests a trial with effects is compared with the same one in a batch (study)
@@ -175,4 +176,4 @@ def test_a_program_of_few_parts_is_the_whole_one():
     for names in (("transport_delay", "direction_gain"), ("payload_change", "stiction", "camera_scale"), ("slope",)):
         vector = to_vector([Effect(name, CATALOGUE[name].typical()) for name in names])
         part = jax.jit(partial(run_full, parts=frozenset(names)))(DRIVE, WIDTH, vector, SHORT.t, SHORT.command, START)
-        np.testing.assert_allclose(np.stack(part, axis=1), full(vector, SHORT, None), rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(np.stack(part, axis=1), full(vector, SHORT), rtol=1e-9, atol=1e-9)

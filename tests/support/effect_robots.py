@@ -29,9 +29,15 @@ def drive_log(rows=ROWS, even=True):
     return log._replace(t=3.0 + np.cumsum(steps))
 
 
-@functools.partial(jax.jit, static_argnames="substeps")
 def full(vector, log, key=KEY, start=START, drive=DRIVE, substeps=4):
-    """Poses (samples, 3) by the full program."""
+    """Poses (samples, 3) by the full program. A value that `jit` is not given is a constant to it, of a program of its
+    own: it is given all."""
+    return full_program(vector, log, key, start, drive, substeps)
+
+
+@functools.partial(jax.jit, static_argnames="substeps")
+def full_program(vector, log, key, start, drive, substeps):
+    """The compiled part of `full`."""
     pose = run_full(drive, WIDTH, vector, jnp.asarray(log.t), log.command, start, key=key, substeps=substeps)
     return jnp.stack(pose, axis=1)
 

@@ -22,11 +22,12 @@ ROBOT = Difference(
     jnp.array([[-7.0697e-5, -6.9978e-5], [-0.0313, 0.0305]]),
 )
 DEAD_ZONE = jnp.array([0.25, 0.20])
+LONGEST = 2000
 
 
 def record(samples=800, seed=0, noise=None, missing=0.0):
-    """A log of the simplified robot as arrays."""
-    log = Log(*_recorded(samples, seed, 0.0 if noise is None else noise))
+    """A log of the simplified robot as arrays: the first rows of one that is as long for all."""
+    log = Log(*(column[:samples] for column in _recorded(LONGEST, seed, 0.0 if noise is None else noise)))
     hidden = np.random.default_rng(seed).random(samples) < missing
     return log._replace(x=jnp.asarray(np.where(hidden, np.nan, log.x)))
 

@@ -27,7 +27,7 @@ FORGOTTEN = 200
 DIVERGED = 9.0
 """Mean square of normalised innovations over the burn-in, three channels alike and none counted beyond `LIMIT`, above
 which a filter has not converged: three deviations where one is expected."""
-LANES, ROWS = (8, 32), 64
+LANES, ROWS = 32, 64
 """Stretches that one call of the compiled program takes, and what their rows are a multiple of: there are few shapes,
 for each takes seconds to compile. 32 and 128 stretches cost 0.8 and 0.9 ms each on one core; of fewer at a time less is
 filled up, and more cores have work."""
@@ -106,10 +106,9 @@ def _in_blocks(vector: Array, laws: Laws | None, noise: Noise, lost: float | Non
     """`filter_and_run` of any number of stretches; the last block is filled up with copies of its last one.
 
     Blocks run side by side where there are cores."""
-    count = stretch.t.shape[1]
-    size, blocks = next((n for n in LANES if n >= count), LANES[-1]), []
-    for begin in range(0, count, size):
-        chosen = np.minimum(np.arange(begin, begin + size), count - 1)
+    count, blocks = stretch.t.shape[1], []
+    for begin in range(0, count, LANES):
+        chosen = np.minimum(np.arange(begin, begin + LANES), count - 1)
         block = Stretch(*(
             np.take(leaf, chosen, axis=axis) for leaf, axis in zip(stretch, AXES, strict=True)
         ))  # fmt: skip

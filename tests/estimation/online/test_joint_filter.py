@@ -53,6 +53,11 @@ def record(key, noise=NOISE, values=TRUTH, rows=ROWS, name="multilevel"):
     return command, poses(own, command, noise, values)
 
 
+def opening(key, rows):
+    """The first rows of a record that is as long for all tests: one program makes it."""
+    return jax.tree.map(lambda column: column[:rows], record(key))
+
+
 def poses(key, command, noise=NOISE, values=TRUTH):
     """What the camera sees of that robot under some commands (rows,)."""
     rows = len(command.right)
@@ -119,7 +124,7 @@ def test_output_of_an_uncertain_dead_zone_is_its_mean():
 
 
 def test_row_by_row_is_the_scan_and_compiles_once():
-    rows = samples(*record(jax.random.key(1), rows=40))
+    rows = samples(*opening(jax.random.key(1), 40))
     many, _ = jax.jit(last)(prior(), rows)
     one, own = prior(), jax.jit(partial(step))  # compilations of its own to count
     for k in range(40):
@@ -130,7 +135,7 @@ def test_row_by_row_is_the_scan_and_compiles_once():
 
 
 def test_rows_that_say_nothing_change_nothing():
-    rows = samples(*record(jax.random.key(7), rows=3))
+    rows = samples(*opening(jax.random.key(7), 3))
     state = prior()
     for k in range(3):
         state, _ = compiled(state, jax.tree.map(lambda c, k=k: c[k], rows))
@@ -256,7 +261,7 @@ def test_gaps_and_uneven_steps():
 
 
 def test_a_robot_that_is_carried_away_is_found_again():
-    command, pose = record(jax.random.key(8), rows=400)
+    command, pose = opening(jax.random.key(8), 400)
     carried = 3.0 - pose.y, 1.0 + pose.x, pose.theta + 0.5 * jnp.pi
     moved = type(pose)(*(jnp.where(jnp.arange(400) < 200, *pair) for pair in zip(pose, carried, strict=True)))
     outlier = moved._replace(y=moved.y.at[100].add(0.5))
@@ -272,7 +277,7 @@ def test_a_robot_that_is_carried_away_is_found_again():
 
 @pytest.mark.slow
 def test_init_from_a_log_is_the_model_of_its_first_seconds():
-    command, pose = record(jax.random.key(9), rows=300)
+    command, pose = opening(jax.random.key(9), 300)
     log = make_log(PERIOD * np.arange(300), *(np.asarray(c) for c in (*command, *pose)))
     state = init(log, d_max=D_MAX)
     model = to_model(state, PERIOD)

@@ -70,7 +70,9 @@ def test_white_shortcut_is_the_general_curvature():
         np.testing.assert_allclose(a, b, rtol=1e-9, atol=1e-9 * np.max(np.abs(b)))
 
 
-@pytest.mark.parametrize("law", list(NOISE_LAWS.values()))
+@pytest.mark.parametrize(
+    "law", [pytest.param(law, marks=[pytest.mark.slow] * (name in ("ar1", "slip"))) for name, law in NOISE_LAWS.items()]
+)
 def test_derivatives_are_finite_at_corners(law):
     """At rest, on a dead zone's edge, at both ends of the bounds, and with no pose at all."""
     log = make_log(PERIOD * np.arange(30), np.full(30, 0.25), np.full(30, -0.2), *np.zeros((3, 30)))

@@ -21,7 +21,7 @@ CAMERA = Noise(1e-3, 1e-2)
 
 
 def test_bound_is_the_inverse_information_by_finite_differences():
-    log = logged(0, rows=120)
+    log = logged(0)
 
     @jax.jit
     def poses(values):
