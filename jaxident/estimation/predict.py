@@ -1,5 +1,6 @@
 """Free-run prediction from many rows of a log, each start state filtered from the rows before it alone."""
 
+import warnings
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -8,6 +9,7 @@ from jaxident.effects.checks import check_effects
 from jaxident.effects.discovered import check_discovered
 from jaxident.errors import InputError
 from jaxident.estimation.ahead import session
+from jaxident.estimation.ahead.beyond_range import beyond_range
 from jaxident.estimation.ahead.predict_difference import run_difference_ahead
 from jaxident.estimation.ahead.run_ahead import Ahead, run_ahead
 from jaxident.estimation.ahead.stretches import Starts, every
@@ -62,7 +64,8 @@ def predict(
     Free runs begin at rows burn_in, burn_in + stride, ... of each run. A physical model, with effects or without,
     begins from the state that a filter finds in the rows before (`run_ahead`). Where the filter does not converge, the
     free run begins from the speed that earlier commands give from rest, at the last pose. A model of free numerators is
-    fitted to the poses of the burn-in. Needs double precision.
+    fitted to the poses of the burn-in. A UserWarning tells of free runs that leave what a discovered law has seen.
+    Needs double precision.
 
     Args:
         model: the robot.
@@ -107,6 +110,8 @@ def predict(
     else:
         begin = session.session_time(model, log) if session_time is None else session_time
         ahead = run_ahead(model, log, starts, horizon, burn_in=burn_in, session_time=begin)
+        for line in beyond_range(model, log, starts, ahead.pose, begin):
+            warnings.warn(line, stacklevel=2)
     return _flatten(log, starts, ahead)
 
 

@@ -18,9 +18,9 @@ SIGNAL_WORDS = {
 TIMES_WORDS = {"1": "", "v": "speed times ", "w": "turn rate times "}
 SEEN = (
     "These laws are in no catalogue. They were found on the runs that fit, and runs that took no part in that confirm "
-    "them. Each adds a curve of one signal at one place. The corrected model has them, and `predict` and "
-    "`simulate` obey them; `plan` and studies do not run them. "
-    "Beyond the signals that these logs show, a curve stays at its last value: that is a guess."
+    "them. Each adds a curve of one signal at one place. The corrected model has them; `predict`, `simulate`, `plan` "
+    "and studies run them. Beyond the signals that these logs show, a curve stays at its last value. That is a guess, "
+    "and `predict` warns where it is made."
 )
 CAPTION = (
     "Line: the curve; shade: two standard deviations; grey bars: how often the robot was there. A straight line that "

@@ -7,12 +7,16 @@ import numpy as np
 import pytest
 
 import jaxident as ji
-from jaxident.array_types import Pose
+from jaxident.array_types import AT_REST, Pose
 from jaxident.effects.discovered import ACTS, MOST_KNOTS, MOST_LAWS, check_discovered, laws_of, shifted, with_laws
 from jaxident.errors import InputError
+from jaxident.estimation.ahead.beyond_range import beyond_range, signals
+from jaxident.estimation.ahead.stretches import Starts, every
 from jaxident.log import make_log
+from jaxident.robot.dead_zone import effective_command
 from jaxident.robot.drive import Physical
 from jaxident.robot.model import Discovered, Effect, Model
+from jaxident.robot.simulate import run_physical
 
 STEP, ROWS = 0.04, 200
 ROBOT = Model(STEP, Physical(np.array([3.0, 5.0]), np.array([[0.8, 0.78], [9.0, -9.2]])), np.array([0.08, 0.1]))
@@ -145,3 +149,38 @@ def test_a_plan_drives_the_robot_with_its_laws():
     np.testing.assert_allclose(found.area, [np.ptp(path.x), np.ptp(path.y)], rtol=0.02)
     plain = ji.simulate(dataclasses.replace(robot, discovered=()), found.log)
     assert np.abs(np.array([np.ptp(plain.x), np.ptp(plain.y)]) / found.area - 1.0).max() > 0.05
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: f"{law[0]} by {law[2]}")
+def test_predictions_beyond_what_a_law_has_seen_are_told(law):
+    """A curve that ends within the robot's range is left by some free runs, one that spans it by none."""
+    log = drive()
+    log = log._replace(**{name: np.asarray(getattr(ji.simulate(ROBOT, log), name)) for name in ("x", "y", "theta")})
+    starts = every(log, 20, 40)
+    starts = type(starts)(*(column[starts.row + 30 < len(log.t)] for column in starts))
+    pose = np.stack([np.stack(log.pose, axis=1)[row + 1 : row + 31] for row in starts.row])
+    signal = signals(ROBOT, log, starts, pose, 0.0)[law[2]]
+    low, high = np.nanmin(signal), np.nanmax(signal)
+    for part, left in ((1.0, False), (0.5, True)):
+        robot = with_law(*law[:3], np.linspace(low, low + part * (high - low), 5), np.zeros(5))
+        lines = beyond_range(robot, log, starts, pose, 0.0)
+        assert bool(lines) == left
+        assert all(f"of {law[2]} in which" in line for line in lines)
+
+
+def test_signals_along_predicted_poses_are_the_robots():
+    log = drive()
+    states = run_physical(ROBOT, log.command, STEP, AT_REST)
+    log = log._replace(x=np.asarray(states.x), y=np.asarray(states.y), theta=np.asarray(states.theta))
+    starts = Starts(np.array([0]), np.array([20]))
+    found = signals(ROBOT, log, starts, np.stack(log.pose, axis=1)[None, 21:81], 3.0)
+    middle = [0.5 * (np.asarray(column)[21:80] + np.asarray(column)[22:81]) for column in (states.v, states.w)]
+    np.testing.assert_allclose(found["v"][:, 0], middle[0], atol=0.02 * np.abs(middle[0]).max())
+    np.testing.assert_allclose(found["w"][:, 0], middle[1], atol=0.05 * np.abs(middle[1]).max())
+    np.testing.assert_allclose(found["time"][:, 0], 3.0 + STEP * np.arange(21, 81))
+    right = effective_command(log.command, ROBOT.dead_zone).right[21:81]
+    np.testing.assert_allclose(found["push right"][:, 0], right)
+    steady = found["own speed"].reshape(2, 59) - np.linalg.solve(
+        ROBOT.physical.gain, ROBOT.physical.rate[:, None] * np.stack(middle)
+    )
+    assert np.abs(steady).max() < 0.1
