@@ -64,6 +64,7 @@ def _law(shown: Shown) -> dict[str, Any]:
         "share": shown.share,
         "p_value": shown.p_value,
         "looks_like": None if form is None else form._asdict(),
+        "alike": [kind._asdict() for kind in shown.alike],
     }
 
 

@@ -5,6 +5,7 @@ import dataclasses
 from jaxident import plot
 from jaxident.diagnosis.account.discovered import Shown
 from jaxident.diagnosis.diagnose import Diagnosis
+from jaxident.diagnosis.discovery.candidates import Kind
 from jaxident.diagnosis.discovery.forms import beyond
 from jaxident.effects.discovered import ACTS, SIGNALS
 from jaxident.report.page import Figure, Section, Table
@@ -31,8 +32,7 @@ CAPTION = (
 def sentence(shown: Shown) -> str:
     """One law in a sentence."""
     law = shown.law
-    what = f"{TIMES_WORDS[law.times]}a curve of the {SIGNAL_WORDS[law.signal]}"
-    return f"to the {law.acts_on} comes {what}{_like(shown)}"
+    return f"to the {law.acts_on} comes {_words(shown.kind)}{_like(shown)}"
 
 
 def _like(shown: Shown) -> str:
@@ -58,12 +58,27 @@ def discovered(found: Diagnosis) -> list[Section]:
         plot.discovered(told, shown.density, ax=ax, xlabel=f"{SIGNAL_WORDS[law.signal]} [{SIGNALS[law.signal]}]",
                         ylabel=f"{law.acts_on}\n[{unit}]")  # fmt: skip
     rows = [
-        (shown.law.acts_on, f"{TIMES_WORDS[shown.law.times]}a curve of the {SIGNAL_WORDS[shown.law.signal]}",
+        (shown.law.acts_on, _words(shown.kind),
          percent(shown.share), f"{shown.p_value:.2g}", _form(shown))
         for shown in found.discovered
     ]  # fmt: skip
     table = Table(("acts on", "what is added", "share of the error", "probability by chance", "looks like"), rows)
-    return [Section("What was discovered", [SEEN, Figure(plot.image(figure), "Discovered curves", CAPTION), table])]
+    picture = Figure(plot.image(figure), "Discovered curves", CAPTION)
+    return [Section("What was discovered", [SEEN, picture, table, *_alike(found)])]
+
+
+def _alike(found: Diagnosis) -> list[str]:
+    """A line for each law that has others like it."""
+    return [
+        f"Nearly as much as by the {shown.law.acts_on} by {_words(shown.kind)} would be explained by: "
+        f"{'; '.join(f'{kind.acts_on} by {_words(kind)}' for kind in shown.alike)}."
+        for shown in found.discovered
+        if shown.alike
+    ]
+
+
+def _words(kind: Kind) -> str:
+    return f"{TIMES_WORDS[kind.times]}a curve of the {SIGNAL_WORDS[kind.signal]}"
 
 
 def _form(shown: Shown) -> str:

@@ -140,6 +140,7 @@ def test_every_place_has_a_law_that_was_tried():
     assert {law[0] for law in LAWS} == set(ACTS)
 
 
+@pytest.mark.slow
 def test_a_plan_drives_the_robot_with_its_laws():
     """The room that it says the path needs is that of the simulator's path, of which the robot without laws needs
     another."""

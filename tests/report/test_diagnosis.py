@@ -7,6 +7,7 @@ import pytest
 from support.diagnoses import LARGEST, VERDICTS, discovered_law, finding_of, made_up
 
 from jaxident.diagnosis.decide import Parameter
+from jaxident.diagnosis.discovery.candidates import Kind
 from jaxident.diagnosis.smallest_effects import smallest_sizes
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.report import Figure, Table, render
@@ -237,6 +238,18 @@ def test_discovered_laws_have_a_section_a_picture_and_a_sentence():
     blocks = section(page, "What was discovered").blocks
     assert any(isinstance(block, Figure) and block.png for block in blocks)
     assert "with discovered laws" in str(section(page, "How large the gap is").blocks)
+    assert "Nearly as much" not in str(blocks)
+
+
+def test_laws_that_explain_nearly_as_much_are_named():
+    law = discovered_law()._replace(alike=(Kind("speed sideways", "1", "heading"),))
+    blocks = section(
+        diagnosis_page(made_up("partly")._replace(discovered=(law,)), "runs"), "What was discovered"
+    ).blocks
+    assert blocks[-1] == (
+        "Nearly as much as by the acceleration along by speed times a curve of the turn rate w would be explained by: "
+        "speed sideways by a curve of the heading."
+    )
 
 
 def test_what_the_judging_runs_refuse_is_told_in_a_sentence():

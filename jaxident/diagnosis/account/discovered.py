@@ -22,7 +22,7 @@ from jaxident.robot.model import Discovered, Model
 class Shown(NamedTuple):
     """A discovered law in the user's unit, the rows that lie nearest to each of its knots, the share of the refitted
     nominal model's error that it takes away beside the laws before it, the probability that it takes none away, and
-    what it looks like."""
+    what it looks like; alike: other kinds of laws that would explain nearly as much."""
 
     kind: Kind
     law: Discovered
@@ -30,6 +30,7 @@ class Shown(NamedTuple):
     share: float
     p_value: float
     form: Form | None
+    alike: tuple[Kind, ...] = ()
 
 
 class Confirmed(NamedTuple):
@@ -84,7 +85,7 @@ def each_law(prepared: Prepared, found: Confirmed, total: Array, unit: Array, se
         share, p_value = taken(before.error, after.error, total, unit, seed)
         law = as_law(curve, prepared.largest)
         density = tuple(map(int, curve.density))
-        shown.append(Shown(curve.kind, law, density, share, p_value, form_of(law, density)))
+        shown.append(Shown(curve.kind, law, density, share, p_value, form_of(law, density), curve.alike))
     return tuple(shown)
 
 

@@ -26,7 +26,8 @@ SHORTER = (1.0, 0.5, 0.2, 0.05)
 
 class Curve(NamedTuple):
     """A discovered law for commands over their largest: knots, values there and their deviations (knots,), the variance
-    of its roughness prior, and how many rows lie nearest to each knot."""
+    of its roughness prior, and how many rows lie nearest to each knot; alike: other kinds of laws that
+    would explain nearly as much."""
 
     kind: Kind
     at: Any
@@ -34,6 +35,7 @@ class Curve(NamedTuple):
     deviation: Any
     variance: float
     density: Any
+    alike: tuple[Kind, ...] = ()
 
 
 class Bending(NamedTuple):

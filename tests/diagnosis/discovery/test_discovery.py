@@ -134,11 +134,22 @@ def test_a_speed_that_falls_with_the_square_of_the_turn_rate_is_discovered():
     assert found
     first = found[0].curves[0]
     assert first.kind == Kind("acceleration along", "v", "w")
+    assert first.alike == ()
     here = first.value - np.interp(0.0, first.at, first.value)  # the rate may take a constant
     loss = found[0].fit.vector[PLACES["turn_loss", "loss"]]
     apart = np.abs(here - loss * np.abs(first.at) + 0.25 * first.at**2)
     assert np.all(apart < 4.0 * first.deviation)
     assert apart.mean() < 0.2
+
+
+@pytest.mark.slow
+def test_laws_that_explain_as_much_are_named():
+    """The product of both speeds is w times a straight line of v, and v times one of w."""
+    at = np.linspace(-0.4, 0.4, 9)
+    law = Discovered("acceleration along", "w", "v", at, 0.8 * at)
+    first = searched(dataclasses.replace(ROBOT, discovered=(law,)), 3)[0].curves[0]
+    both = {Kind("acceleration along", "w", "v"), Kind("acceleration along", "v", "w")}
+    assert both <= {first.kind, *first.alike}
 
 
 @pytest.mark.slow

@@ -70,7 +70,7 @@ def test_a_separation_is_what_a_plain_fit_leaves(robot):
 
 def plain_separation(asks, commands):
     """One least-squares problem over all windows of each input, start states by central differences."""
-    states = next_run._paths(asks.base, uncut(commands, asks.period))
+    states = next_run._paths(asks, uncut(commands, asks.period))
     count, samples, _ = commands.shape
     run = np.repeat(np.arange(count), samples)
     flat = [column.T.ravel() for column in (*commands.transpose(2, 1, 0), *states[:3])]
