@@ -27,6 +27,12 @@ BY_CHANCE: dict[str, str] = {
 ORDER = tuple((record.name, parameter.name) for record in CATALOGUE.values() for parameter in record.parameters)
 """Effect and parameter of each entry of the vector that the full simulator takes."""
 
+BY_KIND: dict[tuple[str, ...], tuple[str, ...]] = {
+    kind: tuple(name for name, record in CATALOGUE.items() if kind in record.kinds)
+    for record in CATALOGUE.values()
+    for kind in record.kinds
+}
+"""For each kind of discovered law in whose place effects act, their names."""
 NEUTRAL = np.array([parameter.neutral for record in CATALOGUE.values() for parameter in record.parameters])
 """The vector (parameters,) at which no effect does anything."""
 

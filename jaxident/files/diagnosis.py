@@ -10,7 +10,7 @@ from jaxident.diagnosis.account.measure import Gap
 from jaxident.diagnosis.account.where import OF_COMMANDS, Region
 from jaxident.diagnosis.detectability import Replay
 from jaxident.diagnosis.diagnose import Diagnosis
-from jaxident.effects.catalogue import CATALOGUE
+from jaxident.effects.catalogue import BY_KIND, CATALOGUE
 
 SCHEMA = "jaxident.diagnosis/2"
 
@@ -65,6 +65,7 @@ def _law(shown: Shown) -> dict[str, Any]:
         "p_value": shown.p_value,
         "looks_like": None if form is None else form._asdict(),
         "alike": [kind._asdict() for kind in shown.alike],
+        "effects_there": list(BY_KIND.get(tuple(shown.kind), ())),
     }
 
 

@@ -7,9 +7,10 @@ from jaxident.diagnosis.account.discovered import Shown
 from jaxident.diagnosis.diagnose import Diagnosis
 from jaxident.diagnosis.discovery.candidates import Kind
 from jaxident.diagnosis.discovery.forms import beyond
+from jaxident.effects.catalogue import BY_KIND
 from jaxident.effects.discovered import ACTS, SIGNALS
 from jaxident.report.page import Figure, Section, Table
-from jaxident.report.words import number, percent
+from jaxident.report.words import number, percent, plain, together
 
 SIGNAL_WORDS = {
     "v": "speed v", "w": "turn rate w", "heading": "heading", "x": "position x", "y": "position y",
@@ -64,7 +65,19 @@ def discovered(found: Diagnosis) -> list[Section]:
     ]  # fmt: skip
     table = Table(("acts on", "what is added", "share of the error", "probability by chance", "looks like"), rows)
     picture = Figure(plot.image(figure), "Discovered curves", CAPTION)
-    return [Section("What was discovered", [SEEN, picture, table, *_alike(found)])]
+    return [Section("What was discovered", [SEEN, picture, table, *_other_forms(found), *_alike(found)])]
+
+
+def _other_forms(found: Diagnosis) -> list[str]:
+    """A line for each law that may be an effect of the catalogue in another form."""
+    lines = []
+    for shown in found.discovered:
+        names = BY_KIND.get(tuple(shown.kind), ())
+        if names:
+            told = together(map(plain, names), "or")
+            where = f"{shown.law.acts_on}, {_words(shown.kind)}"
+            lines.append(f"{where[0].upper()}{where[1:]}: this may be {told} in another form than the catalogue's.")
+    return lines
 
 
 def _alike(found: Diagnosis) -> list[str]:

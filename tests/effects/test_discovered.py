@@ -8,6 +8,8 @@ import pytest
 
 import jaxident as ji
 from jaxident.array_types import AT_REST, Pose
+from jaxident.diagnosis.discovery.candidates import KINDS
+from jaxident.effects.catalogue import BY_KIND
 from jaxident.effects.discovered import ACTS, MOST_KNOTS, MOST_LAWS, check_discovered, laws_of, shifted, with_laws
 from jaxident.errors import InputError
 from jaxident.estimation.ahead.beyond_range import beyond_range, signals
@@ -129,6 +131,12 @@ BAD = (
 def test_a_law_that_no_program_can_run_is_refused(change, words):
     with pytest.raises(InputError, match=words):
         check_discovered([Discovered(**{**GOOD, **change})])
+
+
+def test_effects_name_the_laws_in_whose_place_they_act():
+    assert "turn_loss" in BY_KIND["acceleration along", "v", "w"]
+    for kind in BY_KIND:
+        assert kind in {tuple(known) for known in KINDS}
 
 
 def test_too_many_laws_are_refused():
