@@ -66,7 +66,7 @@ def confirm(prepared: Prepared, finding: Finding, direct: dict, seed: int, plain
         steps = steps or [judge_model(_plain(plain.model), prepared)]
         whole, draws = sized_corrected(prepared, beside(finding, bending), direct, seed, bending)
         unit = deviations(whole.law) ** 2
-        steps = [*steps, judge_model(whole.model, prepared)]
+        steps = [*steps, judge_model(_plain(whole.model), prepared)]
         (share, p_value), (more, _) = (
             taken(before.error, steps[-1].error, steps[0].error ** 2 / unit, unit, seed)
             for before in (steps[0], steps[-2])
