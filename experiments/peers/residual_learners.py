@@ -69,7 +69,7 @@ def learners() -> dict:
         return GaussianProcessRegressor(kernel, normalize_y=True, random_state=0)
 
     def network():
-        return MLPRegressor((64, 64), early_stopping=True, max_iter=2000, random_state=0)
+        return MLPRegressor(hidden_layer_sizes=(64, 64), early_stopping=True, max_iter=2000, random_state=0)
 
     return {
         name: lambda make=make: TransformedTargetRegressor(make_pipeline(StandardScaler(), make()),
