@@ -5,7 +5,7 @@ import inspect
 import json
 
 import jaxident as ji
-from jaxident import _HOMES, _ROOMS
+from jaxident import _HOMES, _ROOMS, results
 
 GROUPS = {
     "Begin": ("start_jax",),
@@ -62,7 +62,9 @@ def page() -> str:
         for name in names:
             parts.append(directive(f"ji.{name}", home(name)))
             if name in RESULTS:
-                parts.append(directive(f"What ji.{name} returns", f"jaxident.results.{RESULTS[name]}", members=True))
+                parts.append(
+                    directive(f"What ji.{name} returns", f"jaxident.results.{RESULTS[name]}", own(RESULTS[name]))
+                )
     for room, title in ROOMS.items():
         parts.append(f"## {title}\n")
         if room in CALLED:
@@ -87,7 +89,13 @@ def inside(room: str) -> list[tuple[str, str]]:
     return [(name, f"{it.__module__}.{it.__qualname__}") for name, it in found.items() if hasattr(it, "__qualname__")]
 
 
-def directive(heading: str, place: str, members: bool = False) -> str:
+def own(name: str) -> list[str]:
+    """What a class of results adds to the tuple that it is made from, without what begins with an underscore."""
+    found = vars(getattr(results, name))
+    return [each for each in (*found.get("__annotations__", ()), *found) if not each.startswith("_")]
+
+
+def directive(heading: str, place: str, members: bool | list[str] = False) -> str:
     """The lines that mkdocstrings replaces by a docstring."""
     options = {"heading": heading, "toc_label": heading, "members": members}
     return "\n".join([f"::: {place}", "    options:", *(f"      {k}: {json.dumps(v)}" for k, v in options.items()), ""])
