@@ -62,9 +62,7 @@ def page() -> str:
         for name in names:
             parts.append(directive(f"ji.{name}", home(name)))
             if name in RESULTS:
-                parts.append(
-                    directive(f"What ji.{name} returns", f"jaxident.results.{RESULTS[name]}", own(RESULTS[name]))
-                )
+                parts += returned(name)
     for room, title in ROOMS.items():
         parts.append(f"## {title}\n")
         if room in CALLED:
@@ -87,6 +85,16 @@ def inside(room: str) -> list[tuple[str, str]]:
     listed = names or [name for name, found in vars(module).items() if getattr(found, "__module__", "") == _ROOMS[room]]
     found = {name: getattr(module, name) for name in listed if not name.startswith("_")}
     return [(name, f"{it.__module__}.{it.__qualname__}") for name, it in found.items() if hasattr(it, "__qualname__")]
+
+
+def returned(name: str) -> list[str]:
+    """What a function returns: what the result can do, and the fields of the tuple that it is made from."""
+    result = RESULTS[name]
+    fields = getattr(results, result).__mro__[1]
+    return [
+        directive(f"What ji.{name} returns", f"jaxident.results.{result}", own(result)),
+        directive(f"Its fields: {result}", f"{fields.__module__}.{fields.__qualname__}"),
+    ]
 
 
 def own(name: str) -> list[str]:
