@@ -32,7 +32,7 @@ def reference(names, log, **options):
 
 
 def tolerance(names):
-    """200 samples: position to 1e-6 m, with corners to 1e-4 m, heading to as many radians."""
+    """120 samples: position to 1e-6 m, with corners to 1e-4 m, heading to as many radians."""
     return 1e-4 if any(name in CORNERS for name in names) else 1e-6
 
 

@@ -12,6 +12,8 @@ from jaxident.files.models import save_model
 from jaxident.files.studies import EXAMPLE, parse_study, read_study
 from jaxident.study.dataset import describe
 
+ESTIMATORS = '[{ name = "key-term", method = "key-term-least-squares" }]'
+
 
 def test_a_file_is_its_study():
     assert describe(parse_study(SMALL_TOML, "study.toml")) == describe(SMALL)
@@ -91,9 +93,9 @@ def test_an_axis_of_effects():
         ("noise = [1e-6, 1e-4]", "noise = 1e-6", ["noise", "list"]),
         ("noise = [1e-6, 1e-4]", "noise = [-1e-6]", ["noise", "negative"]),
         ("noise = [1e-6, 1e-4]", "noise = [inf]", ["noise[0]", "finite"]),
-        ('["batch"]', '["kalman"]', ["kalman", "batch, recursive"]),
-        ('["batch"]', '[{ method = "batch", settings = { reading = "x" } }]', ["reading", "one_step"]),
-        ('["batch"]', '["batch", "batch"]', ["estimators", "twice"]),
+        (ESTIMATORS, '["kalman"]', ["kalman", "batch, recursive"]),
+        (ESTIMATORS, '[{ method = "batch", settings = { reading = "x" } }]', ["reading", "one_step"]),
+        (ESTIMATORS, '["batch", "batch"]', ["estimators", "twice"]),
         ("gain = 0.2", "mass = 0.2", ["robots[0]", "spread", "mass"]),
         ("gain = 0.2", "gain = 2.0", ["spread", "below 1"]),
         ('"published"', '"nobody"', ["robots[0]", "nobody", "no such file"]),

@@ -19,10 +19,10 @@ def test_the_axis_of_effects_is_there_where_the_study_has_it(tmp_path, study, ma
     page = (tmp_path / "index.html").read_text()
     assert ("3 sets of effects" in page) == bool(maps)
     lead = page.split('<p class="lead">')[1].split("</p>")[0]
-    assert lead.startswith("batch ")
+    assert lead.startswith("key-term ")
     assert "camera noise" in lead
     assert '{"jaxident"' not in page
-    assert page.count('alt="batch: error [%] by effect, at 0.1 mm of camera noise"') == maps
+    assert page.count('alt="key-term: error [%] by effect, at 0.1 mm of camera noise"') == maps
     write_summary(summary, tmp_path / "summary.csv")
     with open(tmp_path / "summary.csv") as stream:
         rows = list(csv.DictReader(stream))

@@ -16,7 +16,7 @@ ROBOT = load_model("published")
 DRIVE, WIDTH = ROBOT.physical, jnp.asarray(ROBOT.dead_zone)
 START = State(0.3, -0.2, 0.5, 0.1, -0.5)
 KEY = jax.random.key(0)
-ROWS = 201
+ROWS = 121
 
 
 @functools.cache

@@ -9,7 +9,7 @@ ROBOT = load_model("published")
 
 SMALL = Study(
     robots=(Candidate("published", ROBOT, (0.0, 0.2, 0.0, 0.1)),),
-    estimators=(Choice("batch", "batch"),),
+    estimators=(Choice("key-term", "key-term-least-squares"),),
     seeds=6,
     noise=(1e-6, 1e-4),
     excitations=("staircase",),
@@ -37,6 +37,6 @@ samples = [60]
 hold = 3
 chunk = 4
 robots = [{ model = "published", spread = { gain = 0.2, dead_zone = 0.1 } }]
-estimators = ["batch"]
+estimators = [{ name = "key-term", method = "key-term-least-squares" }]
 """
 """The same as a file."""

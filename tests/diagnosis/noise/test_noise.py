@@ -111,13 +111,14 @@ def test_camera_memory_is_not_taken_for_slip(made):
     np.testing.assert_allclose(found.coloured, law.coloured, rtol=0.4)
 
 
+@pytest.mark.parametrize("draws", [2, pytest.param(6, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("share", "size", "claimed"), [(1.0, 1.0, True), (0.08, 4.0, False)])
-def test_a_memory_is_the_cameras_where_most_windows_show_it(made, share, size, claimed):
-    """Six draws: errors with a memory in all windows, and larger ones in five of sixty, as where wheels slide."""
+def test_a_memory_is_the_cameras_where_most_windows_show_it(made, share, size, claimed, draws):
+    """Some draws: errors with a memory in all windows, and larger ones in five of sixty, as where wheels slide."""
     windows, responses, starts = made
     kinds = (Law(5e-4, 4e-3), Law(5e-4, 4e-3, coloured=(1e-3 * size, 8e-3 * size), coloured_time=0.5))
     white, slow = (np.linalg.cholesky(covariance(law, windows, responses)) for law in kinds)
-    for seed in range(6):
+    for seed in range(draws):
         rng = np.random.default_rng(seed)
         factor = np.where((rng.permutation(COUNT) < share * COUNT)[:, None, None], slow, white)
         noise = (factor @ rng.normal(size=(COUNT, 3 * ROWS, 1)))[..., 0]

@@ -126,11 +126,15 @@ def test_noise_twice_as_high_quarters_the_separation(robot):
     np.testing.assert_allclose(low, 4.0 * high, rtol=1e-6)
 
 
-def test_slip_and_a_memory_of_the_camera_lower_the_separation(robot):
+@pytest.mark.slow
+def test_slip_lowers_the_separation(robot):
     commands = trials("multilevel")
     white = separations(asked(robot, PAIR), commands)
     slipping = separations(asked(robot, PAIR, Noise(1e-3, 1e-2, None, 0.02, 0.5)), commands)
     assert np.all(slipping < 0.9 * white)
+
+
+def test_a_camera_with_a_memory_has_its_law():
     law = question.law_of(Noise(1e-3, 1e-2, 0.3, 0.0, 0.0), 0.05)
     assert law == Law(0.0, 0.0, None, None, (1e-3, 1e-2), 0.3)
 
