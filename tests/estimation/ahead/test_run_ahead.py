@@ -36,7 +36,7 @@ DRIVE = Physical(np.array([3.0, 5.0]), np.array([[0.5, 0.45], [9.0, -8.5]]), np.
 ROBOT = Model(PERIOD, DRIVE, np.array([0.1, 0.12]), noise=Noise(2e-4, 2e-3))
 SATURATING = ("traction_limit", "input_rate_limit", "input_saturation", "stiction")
 SOME = ["asymmetric_dead_zone", "motor_lag", "slope", "camera_scale"]
-"""One of each site, without friction, for which the independent simulator takes ten times as many steps."""
+"""One of each site, without friction, for which the independent simulator takes four times as many steps."""
 SHAPING = [name for name, entry in CATALOGUE.items() if not entry.random]
 
 
