@@ -75,19 +75,23 @@ def _other_forms(found: Diagnosis) -> list[str]:
         names = BY_KIND.get(tuple(shown.kind), ())
         if names:
             told = together(map(plain, names), "or")
-            where = f"{shown.law.acts_on}, {_words(shown.kind)}"
-            lines.append(f"{where[0].upper()}{where[1:]}: this may be {told} in another form than the catalogue's.")
+            lines.append(f"{_place(shown.kind)}: this may be {told} in another form than the catalogue's.")
     return lines
 
 
 def _alike(found: Diagnosis) -> list[str]:
     """A line for each law that has others like it."""
     return [
-        f"Nearly as much as by the {shown.law.acts_on} by {_words(shown.kind)} would be explained by: "
-        f"{'; '.join(f'{kind.acts_on} by {_words(kind)}' for kind in shown.alike)}."
+        f"{_place(shown.kind)}: nearly as much would be explained by "
+        f"{together((f'{kind.acts_on}, {_words(kind)}' for kind in shown.alike), 'or by')}."
         for shown in found.discovered
         if shown.alike
     ]
+
+
+def _place(kind: Kind) -> str:
+    """Where a law acts and what is added, at the beginning of a sentence."""
+    return f"{kind.acts_on[0].upper()}{kind.acts_on[1:]}, {_words(kind)}"
 
 
 def _words(kind: Kind) -> str:

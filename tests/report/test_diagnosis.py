@@ -247,8 +247,8 @@ def test_laws_that_explain_nearly_as_much_are_named():
         diagnosis_page(made_up("partly")._replace(discovered=(law,)), "runs"), "What was discovered"
     ).blocks
     assert blocks[-1] == (
-        "Nearly as much as by the acceleration along by speed times a curve of the turn rate w would be explained by: "
-        "speed sideways by a curve of the heading."
+        "Acceleration along, speed times a curve of the turn rate w: nearly as much would be explained by "
+        "speed sideways, a curve of the heading."
     )
 
 
