@@ -69,19 +69,20 @@ def strongest(data: Data, fit: Solution, curves: tuple[Curve, ...]) -> Curve | N
     bring nearly as much are told with it."""
     responses = respond(np.exp(fit.vector[:2]), fit.linear.residual, data.windows)
     base, prior = _base(data, fit, curves)
-    tried: list[tuple[float, Curve]] = []
+    found: list[tuple[float, Curve]] = []
     for each in candidates(path_of(fit, data.windows, laws_from(curves)), responses):
         if any(each.kind == curve.kind for curve in curves):
             continue
         bent = _beside(data, fit, base, prior, each.columns)
         worth = min(bent.evidence - PRICE, bent.held_out)
-        none = np.zeros(KNOTS)
-        tried.append((worth, Curve(each.kind, each.at, none, none, bent.variance, each.density)))
-    most, best = max(tried, key=lambda pair: pair[0], default=(-np.inf, None))
-    if best is None or most <= SURE:
+        if worth > SURE:
+            none = np.zeros(KNOTS)
+            found.append((worth, Curve(each.kind, each.at, none, none, bent.variance, each.density)))
+    if not found:
         return None
+    most, best = max(found, key=lambda pair: pair[0])
     return best._replace(
-        alike=tuple(curve.kind for worth, curve in tried if curve is not best and worth > ALIKE * most)
+        alike=tuple(curve.kind for worth, curve in found if curve is not best and worth > ALIKE * most)
     )
 
 

@@ -2,10 +2,13 @@
 
 import numpy as np
 
-from jaxident.array_types import Array
+from jaxident.array_types import Array, Wheels
 from jaxident.effects.discovered import SIGNALS
 from jaxident.estimation.ahead.stretches import Starts, cut_stretches
 from jaxident.log import Log
+from jaxident.numerics import wrap
+from jaxident.robot.dead_zone import effective_command
+from jaxident.robot.drive import wheel_speeds
 from jaxident.robot.model import Discovered, Model, require_physical
 
 FAR = 0.1
@@ -43,15 +46,15 @@ def signals(model: Model, log: Log, starts: Starts, pose: Array, session_time: f
     lengths = np.array([len(run.t) for run in log.runs()])[starts.run]
     stretch = cut_stretches(log, starts, 0, 0, pose.shape[1], session_time)
     x, y, theta = np.where(starts.row + rows < lengths, np.moveaxis(pose, (2, 1), (0, 1)), np.nan)
-    t, middle = stretch.t[1:], theta[:-1] + 0.5 * np.diff(theta, axis=0)
+    t, turned = stretch.t[1:], np.asarray(wrap(np.diff(theta, axis=0)))
+    middle = theta[:-1] + 0.5 * turned
     v = (np.diff(x, axis=0) * np.cos(middle) + np.diff(y, axis=0) * np.sin(middle)) / np.diff(t, axis=0)
-    w = np.diff(theta, axis=0) / np.diff(t, axis=0)
-    command = np.where(np.isfinite(x)[..., None], stretch.command[1:], np.nan)
-    push = np.sign(command) * np.maximum(np.abs(command) - np.asarray(model.dead_zone), 0.0)
-    speeds = np.stack([drive.rate[0] * v, drive.rate[1] * w], axis=-1) @ np.linalg.pinv(np.asarray(drive.gain)).T
+    w = turned / np.diff(t, axis=0)
+    command = np.where(np.isfinite(x), np.moveaxis(stretch.command[1:], -1, 0), np.nan)
+    push = [np.asarray(wheel) for wheel in effective_command(Wheels(*command), model.dead_zone)]
+    speeds = [np.asarray(wheel) for wheel in wheel_speeds(drive, v, w)]
     return {
-        "v": v, "w": w, "heading": (theta + np.pi) % (2.0 * np.pi) - np.pi, "x": x, "y": y,
-        "time": stretch.session + t + 0.0 * x, "push right": push[..., 0], "push left": push[..., 1],
-        "own speed": np.concatenate([speeds[..., 0], speeds[..., 1]]),
-        "own push": np.concatenate([push[..., 0], push[..., 1]]),
+        "v": v, "w": w, "heading": np.asarray(wrap(theta)), "x": x, "y": y,
+        "time": stretch.session + t + 0.0 * x, "push right": push[0], "push left": push[1],
+        "own speed": np.concatenate(speeds), "own push": np.concatenate(push),
     }  # fmt: skip

