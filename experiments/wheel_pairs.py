@@ -23,7 +23,8 @@ from jaxident.robot.wheel_sensor import WheelSensor
 
 CASES = {
     "motor_lag": {"time_constant": 0.012}, "traction_limit": {"limit": 5.0},
-    "transport_delay": {"delay": 0.008}, "command_polling": {"period": 0.03, "phase": 0.4},
+    "transport_delay": {"delay": 0.008}, "camera_latency": {"delay": 0.008},
+    "command_polling": {"period": 0.03, "phase": 0.4},
     "coulomb_friction": {"right": 0.02, "left": 0.02}, "quadratic_drag": {"along": 0.1, "heading": 0.03},
     "lateral_slip": {"slip": 0.01}, "marker_offset": {"ahead": 0.002},
 }  # fmt: skip

@@ -109,6 +109,7 @@ def _told(found) -> list[str]:
     from jaxident.report.account import account_lines
     from jaxident.report.discovered import sentence
     from jaxident.report.lead import refusal
+    from jaxident.report.motor_or_ground import wheels_line
     from jaxident.report.words import plain_text
 
     lines = account_lines(found.account)
@@ -116,6 +117,7 @@ def _told(found) -> list[str]:
     lines += [f"discovered: {plain_text(sentence(shown))}" for shown in found.discovered]
     lines += [f"refused: {told}"] if (told := refusal(found)) else []
     lines += [table([("cause", "takes part", "site"), *_causes(found)]), _gap(found)]
+    lines += wheels_line(found)
     if found.surplus:
         lines.append(f"your simulator has, and the robot has not: {', '.join(found.surplus)}")
     return [*lines, found.next]

@@ -14,6 +14,7 @@ from jaxident.diagnosis.causes.evidence import CHANCE
 from jaxident.diagnosis.causes.points import differences, rim_differences, seeded, sizes_of
 from jaxident.diagnosis.fit.refit import Data, Solution
 from jaxident.diagnosis.motion.linear import gram, linearise, normal
+from jaxident.diagnosis.motion.rims import untold
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.coordinates import COORDINATES, PLACES, SMOOTH, from_catalogue, sizes, unit_factors
 
@@ -27,7 +28,7 @@ class Answers(NamedTuple):
     """products (n, n): Gram matrix of whitened answers of the poses, nominal parameters and start states projected out.
     own: by effect its columns, one per coordinate, or that at typical size where it has no derivative at neutral;
     scale: prior standard deviation of what each of these is multiplied with; parts: how much of each a faint effect
-    has; typical: by effect the column of its typical size."""
+    has; typical: by effect that these logs may tell the column of its typical size."""
 
     products: Any
     own: dict[str, list[int]]
@@ -60,11 +61,12 @@ def answers(data: Data, nominal: Solution, largest: float) -> Answers:
         more = data.of_rims(linear.rims, linear.rims.slopes, far)
     products = gram(data.whitener, columns, linear.starts, more).products.sum(axis=0)
     order = {place: k for k, place in enumerate(places)}
-    typical = {name: len(places) + k for k, name in enumerate(COORDINATES)}
-    own = {name: [order[p] for p in smooth[name]] if name in smooth else [typical[name]] for name in COORDINATES}
-    parts = {name: [usual[name][key] for key in sized[name]] if name in sized else [1.0] for name in COORDINATES}
+    hidden = untold(data.windows)
+    typical = {name: len(places) + k for k, name in enumerate(COORDINATES) if name not in hidden}
+    own = {name: [order[p] for p in smooth[name]] if name in smooth else [k] for name, k in typical.items()}
+    parts = {name: [usual[name][key] for key in sized[name]] if name in sized else [1.0] for name in typical}
     prior = sizes()
-    scale = {name: prior[smooth[name]] if name in smooth else np.array([AMPLITUDE]) for name in COORDINATES}
+    scale = {name: prior[smooth[name]] if name in smooth else np.array([AMPLITUDE]) for name in typical}
     return Answers(_without(products, len(nominal.places)), own, scale, parts, typical)
 
 

@@ -8,6 +8,7 @@ from jaxident.diagnosis.account.account import Account
 from jaxident.diagnosis.account.discovered import Shown
 from jaxident.diagnosis.account.measure import Gap, Measured, measure
 from jaxident.diagnosis.account.models import as_model
+from jaxident.diagnosis.account.odometry import Odometry, odometry
 from jaxident.diagnosis.account.refused import finding_without
 from jaxident.diagnosis.account.shrink import Shrink
 from jaxident.diagnosis.account.where import Place
@@ -52,6 +53,7 @@ class Diagnosis(NamedTuple):
         suspicions: what the log says against itself, with the option that mends it, a line each.
         refused: effects that fit the runs for naming, and without which the judging runs are predicted better (95 %
             sure). The corrected model has none of them.
+        odometry: the judging stretches as the wheels tell them; None without wheel speeds.
     """
 
     verdict: str
@@ -74,6 +76,7 @@ class Diagnosis(NamedTuple):
     discovered: tuple[Shown, ...] = ()
     suspicions: tuple[str, ...] = ()
     refused: tuple[str, ...] = ()
+    odometry: Odometry | None = None
 
     @property
     def not_testable(self) -> list[str]:
@@ -139,7 +142,7 @@ def diagnose(
     return Diagnosis(verdict, judgement, gap, account, where, selected, parameters, visible(known), replay(known, seed),
                      advice(verdict, judgement, laws), nominal, corrected, shrinks, prepared, finding, surplus,
                      simulator, laws, (*log_suspicions(join(logs)), *suspected_wheels(join(logs))),
-                     refused)  # fmt: skip
+                     refused, odometry(prepared, gap.paths, corrected))  # fmt: skip
 
 
 class Seen(NamedTuple):

@@ -8,6 +8,7 @@ from jaxident.array_types import Array, Pose
 from jaxident.effects import statements
 from jaxident.effects.effect import (
     ALONG,
+    BOTH,
     EVERYWHERE,
     LATERAL,
     Chance,
@@ -17,6 +18,7 @@ from jaxident.effects.effect import (
     Search,
     Suggested,
     Transform,
+    positive,
     signed,
 )
 from jaxident.numerics import safe_divide, sin_cos
@@ -24,6 +26,11 @@ from jaxident.robot.noise import correlated
 
 CENTRAL = 0.01
 """Strength [1/m^2] of a lens whose centre is looked for."""
+
+
+def camera_latency(time: Array, _: Array, delay: Array) -> Array:
+    """t + T: poses that come T late are those of a robot at rest before, whose commands come T late."""
+    return time + delay
 
 
 def marker_offset(pose: Pose, ahead: Array, left: Array) -> Pose:
@@ -204,6 +211,16 @@ RECORDS = (
         channels=(ALONG, LATERAL),
         act=camera_tilt, confused_with=("lens_distortion", "camera_scale"), extension=True,
         search=Search((signed("along_x", 0.4), signed("along_y", 0.4))),
+    ),
+    EffectRecord(
+        name="camera_latency", site="camera", stage="arrival", step=statements.DELAY,
+        words="the camera's poses come late, the wheels' speeds do not",
+        equation="pose(t) = that of the robot at t - T",
+        source="Furgale, Rehder, Siegwart 2013, Unified temporal and spatial calibration, IROS",
+        parameters=(Parameter("delay", "s", 0.0, (0.0, 0.3), 0.05, least=0.0),),
+        channels=BOTH,
+        act=camera_latency, rank=2, confused_with=("transport_delay", "motor_lag"), extension=True, poses_only=True,
+        search=Search((positive("delay", 0.5),)),
     ),
 )  # fmt: skip
 """The effects of this site."""

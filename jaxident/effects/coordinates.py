@@ -57,6 +57,9 @@ the left a marker is nothing tells, but an effect that acts on the speeds of axl
 ON_SPEEDS = {name for name, search in SEARCHED.items() if search.on_speeds}
 """Such effects; play that coasts acts on speeds, too, but tells too little."""
 
+POSES_ONLY = frozenset(name for name in SEARCHED if CATALOGUE[name].poses_only)
+"""Effects of the camera's clock, which wheel speeds are without."""
+
 SILENT = SHAPES | _pairs("silent")
 """Coordinates that do nothing alone."""
 
@@ -73,6 +76,14 @@ _ALL = [coordinate for coordinates in COORDINATES.values() for coordinate in coo
 def neutral_vector(nominal: Array) -> np.ndarray:
     """All coordinates (SIZE,) of a nominal robot (10,) without effects."""
     return np.concatenate([np.asarray(nominal, float), [coordinate.neutral for coordinate in _ALL]])
+
+
+def of_wheels(vectors: Array) -> np.ndarray:
+    """Vectors (..., SIZE) without what acts on the poses alone."""
+    free = [PLACES[name, c.name] for name in POSES_ONLY for c in COORDINATES[name]]
+    found = np.array(vectors)
+    found[..., free] = neutral_vector(np.zeros(len(NOMINAL)))[free]
+    return found
 
 
 def limits() -> tuple[np.ndarray, np.ndarray]:

@@ -194,8 +194,8 @@ class EffectRecord(NamedTuple):
     timed: it goes by session time. extension: beyond the catalogue that this program was asked for. step: its law as
     statements for programs without this package; None where it draws. quantity: what simulators and controllers call
     it, where one of them has a word for it (`jaxident.export`). kinds: discovered laws (acts on, times, signal) in
-    whose place it acts, so that one found there may be this effect in another form. Every record has `search` or
-    `chance`.
+    whose place it acts, so that one found there may be this effect in another form. poses_only: it acts on the camera's
+    clock; wheel speeds are without it, and no log without them is searched for it. All have `search` or `chance`.
     """
 
     name: str
@@ -221,6 +221,7 @@ class EffectRecord(NamedTuple):
     step: Step | None = None
     quantity: str = ""
     kinds: tuple[tuple[str, str, str], ...] = ()
+    poses_only: bool = False
 
     @property
     def random(self) -> bool:

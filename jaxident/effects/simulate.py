@@ -76,8 +76,8 @@ def is_random(model: Model) -> bool:
 
 def _with_wheels(model: Model, log: Log, start: State, key: Array | None, session_time: Array) -> Log:
     """The log with the wheel speeds of a model that has the sensor: those of its drive, in which nothing slips at
-    random."""
-    parts = frozenset(effect.name for effect in model.effects)
+    random and no camera is late."""
+    parts = frozenset(effect.name for effect in model.effects if not CATALOGUE[effect.name].poses_only)
     wheels = _wheels(model.dynamics, model.dead_zone, to_vector(model.effects), log, start, key, session_time,
                      laws_of(model.discovered), model.wheels, substeps=substeps_for(parts), parts=parts)  # fmt: skip
     return log._replace(wheel_r=wheels.right, wheel_l=wheels.left)

@@ -114,6 +114,8 @@ def _effect(effect: Effect, model: Model, target: Target) -> Part:
         return Part(effect.name, FIELD, target.fields[record.quantity], effect=True)
     if record.chance is not None:
         return Part(effect.name, LOST, "it acts by chance", effect=True)
+    if record.poses_only and not target.inside:
+        return Part(effect.name, LOST, "it is the camera's: the robot itself is not late", effect=True)
     if record.stage in target.stages and record.step is not None:
         if record.step.holds(values):
             where = "the law itself" if target.inside else "the commands' wrapper"

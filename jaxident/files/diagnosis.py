@@ -7,6 +7,7 @@ import numpy as np
 from jaxident.diagnosis.account.account import Account, Row
 from jaxident.diagnosis.account.discovered import Shown
 from jaxident.diagnosis.account.measure import Gap
+from jaxident.diagnosis.account.odometry import Odometry
 from jaxident.diagnosis.account.where import OF_COMMANDS, Region
 from jaxident.diagnosis.detectability import Replay
 from jaxident.diagnosis.diagnose import Diagnosis
@@ -37,6 +38,7 @@ def diagnosis_to_dict(found: Diagnosis) -> dict[str, Any]:
         "causes": _causes(found),
         "selected": list(found.selected),
         "refused": list(found.refused),
+        "wheels": None if found.odometry is None else _wheels(found.odometry),
         "discovered": [_law(one) for one in found.discovered] or None,
         "surplus": list(found.surplus),
         "parameters": [p._asdict() for p in found.parameters],
@@ -45,6 +47,16 @@ def diagnosis_to_dict(found: Diagnosis) -> dict[str, Any]:
         "terms": [{"site": term.site, "term": term.name, "gain": gain} for term, gain in found.finding.rest.terms],
         "suspicions": list(found.suspicions),
         "next": found.next,
+    }
+
+
+def _wheels(told: Odometry) -> dict[str, Any]:
+    """Errors of the models and of a robot that moves as its wheels turned, in mm and mrad."""
+    return {
+        "radius": told.sensor.radius,
+        "track": told.sensor.track,
+        "windows": told.starts,
+        "rms": {name: {"position": 1e3 * own[0], "heading": 1e3 * own[1]} for name, own in told.rms.items()},
     }
 
 

@@ -12,6 +12,7 @@ _HOMES = {
     "dead_zone": "signals",
     "commands": "signals",
     "increments": "signals",
+    "wheel_speeds": "wheels",
     "path": "motion",
     "prediction_error": "motion",
     "stretches": "motion",

@@ -15,6 +15,7 @@ from jaxident.report.account import account_section
 from jaxident.report.discovered import discovered
 from jaxident.report.glossary import glossary
 from jaxident.report.lead import details, deviations, headline
+from jaxident.report.motor_or_ground import motor_or_ground
 from jaxident.report.origin import origin_section
 from jaxident.report.page import PHONE, Figure, Page, Section, Table
 from jaxident.report.stretches import served, worst_stretches
@@ -45,6 +46,7 @@ def diagnosis_page(found: Diagnosis, name: str, made: Origin | None = None) -> P
     sections = [
         account_section(found.account, details(found)),
         *worst_stretches(found),
+        *motor_or_ground(found),
         _gap(found),
         _where(found),
         causes.causes(found),

@@ -27,7 +27,7 @@ and settle dry friction to first order."""
 GROUPS = {
     "none": ((), 1e-8),
     "chain": (("input_saturation", "transport_delay", "asymmetric_dead_zone", "direction_gain", "motor_lag",
-               "quadratic_drag", "marker_offset", "heading_offset"), SMOOTH),
+               "quadratic_drag", "marker_offset", "heading_offset", "camera_latency"), SMOOTH),
     "clock": (("twist_quantisation", "command_polling", "dead_zone_drift", "gain_drift", "supply_sag", "turn_loss",
                "mass_offset", "lateral_slip", "camera_scale", "lens_distortion"), SMOOTH),
     "gears": (("input_quantisation", "input_rate_limit", "backlash", "slope", "payload_change", "camera_tilt"), 2e-4),

@@ -59,3 +59,13 @@ def test_increments_are_drawn_in_millimetres_and_milliradians(increment):
     assert (ax.get_ylabel(), strip.get_ylabel()) == ("turn per sample [mrad]", "residual [mrad]")
     assert (ax.get_xlabel(), strip.get_xlabel()) == ("", "time [s]")
     assert plot.increments(t, increment, model).get_ylabel() == "path length per sample [mm]"
+
+
+def test_wheel_speeds_stand_between_the_command_and_the_motion():
+    t, one = np.arange(10.0), np.ones((2, 10))
+    _, axes = plot.figure(3, 1)
+    plot.wheel_speeds(t, one, 2.0 * one, 3.0 * one, modelled={"nominal model": (t[5:], 4.0 * one[:, 5:])}, axes=axes)
+    assert [line.get_label() for line in axes[1].lines] == ["robot (poses)", "wheels", "nominal model"]
+    np.testing.assert_array_equal(curve(axes[0], "wheels").get_ydata(), 2.0 * one[0])
+    np.testing.assert_array_equal(curve(axes[2], "left").get_ydata(), 3.0 * one[1])
+    assert [ax.get_ylabel() for ax in axes] == ["speed [m/s]", "turn rate [rad/s]", "command [unit]"]

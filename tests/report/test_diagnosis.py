@@ -6,17 +6,22 @@ import numpy as np
 import pytest
 from support.diagnoses import LARGEST, VERDICTS, discovered_law, finding_of, made_up
 
+from jaxident.diagnosis.account.odometry import Odometry
 from jaxident.diagnosis.decide import Parameter
 from jaxident.diagnosis.discovery.candidates import Kind
 from jaxident.diagnosis.smallest_effects import smallest_sizes
 from jaxident.effects.catalogue import CATALOGUE
+from jaxident.effects.coordinates import COORDINATES
+from jaxident.files.diagnosis import diagnosis_to_dict
 from jaxident.report import Figure, Table, render
 from jaxident.report.account import account_lines, places_line
 from jaxident.report.causes import BESIDE
 from jaxident.report.diagnosis import diagnosis_page
 from jaxident.report.lead import lead
+from jaxident.report.motor_or_ground import wheels_line
 from jaxident.report.stretches import SHOWN, draw_stretches, worst_starts, worst_stretches
-from jaxident.report.words import EFFECTS, LOOKS, SITES, chance, measured, number, parameters, percent, together
+from jaxident.report.words import EFFECTS, LOOKS, SITES, chance, measured, number, parameters, percent, plain, together
+from jaxident.robot.wheel_sensor import WheelSensor
 
 LEADS = {
     "no_gap": "No gap: 1 s ahead the model is off by",
@@ -185,9 +190,10 @@ def test_no_gap_has_no_map_and_nothing_to_shrink():
 def test_hidden_effects_come_first_with_the_smallest_visible_size():
     part = section(page_of("no_gap"), "What this input could have shown")
     (table,) = tables(part)
-    assert plain_spaces(table.rows[0][0]) == "camera tilt"
+    last = plain(next(reversed(COORDINATES)))
+    assert plain_spaces(table.rows[0][0]) == last
     assert [row[3] for row in table.rows] == sorted(row[3] for row in table.rows)
-    assert "camera tilt" in part.blocks[0]
+    assert last in part.blocks[0]
 
 
 def test_smallest_sizes_follow_the_square_of_the_gain():
@@ -293,3 +299,32 @@ def test_no_stretch_is_drawn_where_none_is_left():
 def test_the_page_says_which_run_served_what():
     (table,) = tables(section(page_of("effects"), "Which run served what"))
     assert [row[-2:] for row in table.rows] == [("30", "–"), ("–", "30")]
+
+
+def with_wheels(found):
+    """The diagnosis of logs whose wheels turned at 10 rad/s."""
+    log, paths = found.prepared.log, found.gap.paths
+    turned = 10.0 + 0.0 * log.t
+    rms = {"nominal": (0.04, 0.03), "corrected": (0.004, 0.005), "wheels": (0.005, 0.006)}
+    told = Odometry(WheelSensor(0.03, 0.1), np.zeros(paths.shape[1:]), rms, 28)
+    prepared = found.prepared._replace(log=log._replace(wheel_r=turned, wheel_l=turned))
+    return found._replace(odometry=told, prepared=prepared)
+
+
+def test_logs_with_wheel_speeds_have_a_section_on_motor_and_ground():
+    found = with_wheels(made_up("effects"))
+    one = section(diagnosis_page(found, "runs"), "Motor or ground")
+    assert "radius of 30 mm and track of 100 mm" in plain_spaces(one.blocks[0])
+    assert [plain_spaces(row[1]) for row in tables(one)[0].rows] == ["40 mm", "4 mm", "5 mm"]
+    assert wheels_line(found) == [
+        "motor or ground: 5 mm and 6 mrad for a robot that moves as its wheels turned, 40 mm and 30 mrad for the "
+        "nominal model"
+    ]
+    assert diagnosis_to_dict(found)["wheels"]["rms"]["wheels"] == {"position": 5.0, "heading": 6.0}
+
+
+def test_logs_without_wheel_speeds_have_none():
+    found = made_up("effects")
+    assert "Motor or ground" not in [part.heading for part in diagnosis_page(found, "runs").sections]
+    assert wheels_line(found) == []
+    assert diagnosis_to_dict(found)["wheels"] is None

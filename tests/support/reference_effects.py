@@ -25,8 +25,9 @@ def simulate_reference(parameters, effects, t, u_r, u_l, start, *, session_time=
     delay = effects.get("transport_delay", {}).get("delay", 0.0)
     arrivals = polled(effects, np.asarray(t, float) + delay, session_time - t[0])
     change = effects.get("payload_change", {}).get("instant", 0.0) - session_time + t[0]
-    stops = np.unique(np.concatenate([t, arrivals, [change]]))
-    stops = stops[(stops >= t[0]) & (stops <= t[-1])]
+    shown = np.asarray(t, float) - effects.get("camera_latency", {}).get("delay", 0.0)  # what the frames of t show
+    stops = np.unique(np.concatenate([shown, arrivals, [change]]))
+    stops = stops[(stops >= shown[0]) & (stops <= shown[-1])]
     state, rows = np.array([*start, *[0.0] * 6]), [start[:3]]
     for begin, end in itertools.pairwise(stops):
         middle = 0.5 * (begin + end)
@@ -34,7 +35,7 @@ def simulate_reference(parameters, effects, t, u_r, u_l, start, *, session_time=
         robot.target = u[index] if index >= 0 else np.zeros(2)
         robot.changed = middle > change
         state = robot.run(state, begin, end, step)
-        if np.any(t == end):
+        if np.any(shown == end):
             rows.append(state[:3])
     return camera(effects, np.asarray(t, float), np.array(rows), rng)
 

@@ -35,7 +35,7 @@ FORWARD = 0.06
 """Share of sealed cases whose input is two forward levels."""
 
 
-LATER = ("command_polling", "twist_quantisation")
+LATER = ("command_polling", "twist_quantisation", "camera_latency")
 """Effects that came to the catalogue after sets had been drawn: the seed of a set must go on to draw the same cases."""
 
 

@@ -12,6 +12,7 @@ from jaxident.diagnosis.causes.search import joining
 from jaxident.diagnosis.causes.search_rounds import TERMS, Found, search
 from jaxident.diagnosis.causes.settled import Settled
 from jaxident.diagnosis.fit.refit import Data, Solution
+from jaxident.diagnosis.motion.rims import untold
 from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.preparation.prepare import Prepared, repaired
 
@@ -89,6 +90,7 @@ class Finding(NamedTuple):
 def find_effects(prepared: Prepared, without: Collection[str] = (), law: Law | None = None) -> tuple[Prepared, Finding]:
     """The search on prepared windows, and these with the commands that arrived where some were lost. `without`: effects
     that the catalogue is to lack. A noise law that is given stays as it is."""
+    without = {*without, *untold(prepared.windows)}
     found = search(prepared.windows, prepared.nominal, without, law)
     if found.lost is not None:
         prepared = repaired(prepared, found.lost)

@@ -15,6 +15,7 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.diagnosis.motion.paths import push_of, rolled
 from jaxident.diagnosis.motion.windows import Windows
+from jaxident.effects.coordinates import POSES_ONLY, of_wheels
 from jaxident.effects.discovered import Laws
 from jaxident.estimation.poses.wheel_colour import samples_each
 from jaxident.parallel import in_parallel
@@ -51,13 +52,18 @@ class Rims(NamedTuple):
         return 0.5 * np.sum((self.whitener @ self.residual(speeds)[..., None])[..., 0] ** 2, axis=-1)
 
 
+def untold(windows: Windows) -> frozenset[str]:
+    """Effects that these windows never tell from others: those of the camera's clock where no wheel speed is."""
+    return POSES_ONLY if windows.wheels is None else frozenset()
+
+
 _rolled, _pushed = jax.jit(rolled), jax.jit(push_of)
 
 
 def rim_speeds(vectors: Array, starts: Array, windows: Windows, laws: Laws | None = None) -> np.ndarray:
     """Speed [m/s] and turn rate [rad/s] of the rims (batch, windows, numbers) at vectors (batch, SIZE) and starts
     (batch, 5, windows)."""
-    windows = jax.tree.map(jnp.asarray, windows)
+    windows, vectors = jax.tree.map(jnp.asarray, windows), of_wheels(vectors)
     push = in_parallel(_pushed, [(vector, windows) for vector in vectors], ahead=False)
     lanes = [(*each, windows, laws) for each in zip(vectors, starts, push, strict=True)]
     found = in_parallel(_rolled, lanes, ahead=False)

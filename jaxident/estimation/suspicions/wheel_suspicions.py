@@ -164,10 +164,10 @@ def offset(response: Response, log: Log) -> str:
     step = typical_step(log)
     if response.rival is not None or not abs(late) > max(SEVERAL * step, SURE * error):
         return ""
-    word = "late" if late > 0.0 else "early"
+    word, cause = ("late", "two clocks") if late > 0.0 else ("early", "two clocks, or a camera that reports late")
     return (
         f"the wheel speeds come {abs(late):.3g} s {word} beside the poses (standard error {error:.1g} s, "
-        f"{abs(late) / step:.1f} rows): two clocks: `jaxident convert --log LOG --wheels-offset {-late:.3g} --out NEW`"
+        f"{abs(late) / step:.1f} rows): {cause}: `jaxident convert --log LOG --wheels-offset {-late:.3g} --out NEW`"
     )
 
 

@@ -1,0 +1,81 @@
+"""Motor or ground: a robot that moves as its wheels turned beside the models, in words and in a picture."""
+
+import numpy as np
+
+from jaxident import plot
+from jaxident.diagnosis.account.odometry import Odometry, steps_of_poses, steps_of_wheels
+from jaxident.diagnosis.diagnose import Diagnosis
+from jaxident.report.page import PHONE, Figure, Section, Table
+from jaxident.report.words import angle, error, length, plain_text
+
+LEAD = 15
+"""Rows before the stretch that the picture shows: what was commanded just before."""
+HEADS = {"nominal": "nominal model", "corrected": "corrected model", "wheels": "as its wheels turned",
+         "wheels_late": "as its wheels turned, as late as the camera"}  # fmt: skip
+
+
+def motor_or_ground(found: Diagnosis) -> list[Section]:
+    """The section of a page; none for logs without wheel speeds."""
+    told = found.odometry
+    if told is None:
+        return []
+    rows = [(HEADS[name], length(own[0]), angle(own[1])) for name, own in told.rms.items()]
+    caption = f"Root mean square errors {found.gap.horizon:.3g} s ahead, from the same {told.starts} places."
+    table = Table(("prediction", "position", "heading"), rows, caption)
+    text = TEXT.format(radius=length(told.sensor.radius), track=length(told.sensor.track))
+    return [Section("Motor or ground", [text, *_picture(found, told), table])]
+
+
+TEXT = (
+    "The wheels say what the motors did; the poses say what became of it. Here a robot is taken to move exactly as its "
+    "wheels turned. Its radius of {radius} and track of {track} are those that suit the fitted runs best. What this "
+    "robot gets right and the nominal model does not lies before the wheels: in the command, the motors, the load. "
+    "What it gets wrong itself lies behind them: on the ground or in the camera."
+)
+PICTURE = (
+    "The stretch on which the nominal model errs most. Where the wheels leave the model, the cause lies before the "
+    "wheels. Where the robot leaves the wheels, it lies behind them."
+)
+
+
+def wheels_line(found: Diagnosis) -> list[str]:
+    """The same as a line for terminals."""
+    if found.odometry is None:
+        return []
+    rms = found.odometry.rms
+    return [
+        plain_text(
+            f"motor or ground: {error(rms['wheels'])} for a robot that moves as its wheels turned, "
+            f"{error(rms['nominal'])} for the nominal model"
+        )
+    ]
+
+
+def _picture(found: Diagnosis, told: Odometry) -> list[Figure]:
+    """The stretch with all wheel speeds on which the nominal model errs most."""
+    errors = np.sum(np.asarray(found.gap.errors)[1], axis=1) + 0.0 * told.paths[:, -1, 0]
+    if not np.isfinite(errors).any():
+        return []
+    worst = int(np.nanargmax(errors))
+    starts, rows = found.prepared.judging, found.prepared.rows
+    run, row = found.prepared.log.runs()[starts.run[worst]], int(starts.row[worst])
+    own = run.rows(max(row - LEAD, 0), row + rows + 1)
+    t, wheels = np.asarray(own.t), np.stack([own.wheel_r, own.wheel_l])
+    rims = steps_of_wheels(t, wheels) / np.diff(t)
+    rims *= np.array([[told.sensor.radius], [told.sensor.radius / told.sensor.track]])
+    ahead = np.asarray(run.t)[row + 1 : row + 1 + rows]
+    models = {
+        HEADS[name]: (ahead[1:], _speeds(ahead, path[worst]))
+        for name, path in zip(("nominal", "corrected"), found.gap.paths, strict=True)
+    }
+    if np.array_equal(found.gap.paths[0], found.gap.paths[1], equal_nan=True):
+        del models[HEADS["corrected"]]
+    figure, axes = plot.figure(3, 1, size=(PHONE, 4.6), share_x=True)
+    ground = steps_of_poses(np.stack(own.pose)) / np.diff(t)
+    plot.wheel_speeds(t[1:], ground, rims, np.stack(own.command)[:, :-1], modelled=models, axes=axes)
+    return [Figure(plot.image(figure), "Commands, wheels and motion of the worst stretch", PICTURE)]
+
+
+def _speeds(t: np.ndarray, path: np.ndarray) -> np.ndarray:
+    """Speed and turn rate (2, rows - 1) of poses (rows, 3)."""
+    return steps_of_poses(path.T) / np.diff(t)
