@@ -142,7 +142,7 @@ def _arrived(
 ) -> tuple[Solution, tuple[Curve, ...], np.ndarray]:
     """The fit and its curves with their deviations, and the covariance of both."""
     own = len(fit.places)
-    covariance = covariance_from(around.summed)
+    covariance = covariance_from(around.summed, fit.places)
     spread = np.sqrt(np.maximum(np.diagonal(covariance)[own:], 0.0))
     pieces = np.split(spread, np.cumsum([len(curve.at) for curve in curves])[:-1])
     found = tuple(curve._replace(deviation=part) for curve, part in zip(curves, pieces, strict=True))

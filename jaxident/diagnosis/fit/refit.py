@@ -9,7 +9,7 @@ from jaxident.diagnosis.fit.alike import GAINS, unlikeliness, with_prior
 from jaxident.diagnosis.motion.linear import Linear, follow, gram, linearise, normal
 from jaxident.diagnosis.motion.rims import Rims, rim_speeds
 from jaxident.diagnosis.motion.windows import Windows
-from jaxident.effects.coordinates import NOMINAL, PLACES, REACHED, STEPPED, free_places, limits, neutral_vector
+from jaxident.effects.coordinates import NOMINAL, PLACES, REACHED, STEPPED, free_places, limits, neutral_vector, sizes
 from jaxident.effects.discovered import Laws
 from jaxident.effects.effect import EDGE
 
@@ -23,6 +23,8 @@ LONGEST_GAIN = 1.0
 """A step changes a gain by at most this many times both gains of its channel. The prior of the gains is an angle. Where
 the runs tell nothing of a wheel, a free step would overshoot by up to pi/2 times the gains, and the next by more: the
 gain of a wheel that hardly ever passed its dead zone went to -4e25. One time the gains brings both wheels back."""
+WIDE = 10.0
+"""Deviation of a coordinate of which the runs say nothing, in its typical sizes. No other value was tried."""
 INSTANTS = [PLACES[pair] for pair, coordinate in REACHED.items() if not coordinate.relative]
 COUPLING = [NOMINAL.index("coupling_1"), NOMINAL.index("coupling_2")]
 PARTS = (1.0, 0.25, 0.0)
@@ -82,7 +84,8 @@ def refit(data: Data, vector: Array, starts: Array, effects: tuple[str, ...], ho
         moved = solve[:, :, -1] - solve[:, :, :-1] @ step
         new_starts, new_cost = best_starts(data, new_vector, starts, moved.T)
         new_cost += unlikeliness(new_vector)
-        there = _around(data, new_vector, new_starts, places) if new_cost < cost else None
+        taken = new_cost < cost and not (speeds_up(new_vector) and not speeds_up(vector))
+        there = _around(data, new_vector, new_starts, places) if taken else None
         if there is not None and np.all(np.isfinite(there[1])):  # beside a robot that runs away nothing can be told
             gained, damping = cost - new_cost, max(0.2 * damping, 1e-7)
             vector, starts, cost = new_vector, new_starts, new_cost
@@ -93,7 +96,13 @@ def refit(data: Data, vector: Array, starts: Array, effects: tuple[str, ...], ho
             damping *= 10.0
             if damping > 1e6:
                 break
-    return Solution(vector, starts, places, linear, cost, covariance_from(products), step_number)
+    return Solution(vector, starts, places, linear, cost, covariance_from(products, places), step_number)
+
+
+def speeds_up(vector: Array) -> bool:
+    """Whether the robot of a vector (SIZE,) speeds up by itself, without a command: its coupling outdoes its rates. On
+    three runs of a Husky's log a fit ended at such a one."""
+    return bool(vector[COUPLING[0]] * vector[COUPLING[1]] > np.exp(vector[0] + vector[1]))
 
 
 def _calmer(vector: Array) -> tuple[np.ndarray, np.ndarray]:
@@ -177,10 +186,13 @@ def _step(products: Array, now: Array, low: Array, high: Array, damping: float) 
     return step, float(step @ products[:-1, -1] - 0.5 * step @ products[:-1, :-1] @ step)
 
 
-def covariance_from(products: Array) -> np.ndarray:
-    """Covariance of the free coordinates; directions without information get a large finite variance."""
-    own, _, scale = normal(products, list(range(len(products) - 1)), ridge=0.0)
-    values, vectors = np.linalg.eigh(own)
+def covariance_from(products: Array, places: list[int]) -> np.ndarray:
+    """Covariance of the free coordinates in `places`, and of what products (n, n) have behind them. No coordinate is
+    less certain than WIDE of its sizes: what the runs say nothing of would else have a deviation of 1e90, and a
+    prediction with it."""
+    whole, own = np.array(products[:-1, :-1]), np.arange(len(places))
+    whole[own, own] += (WIDE * sizes()[places]) ** -2.0
+    scale = np.sqrt(np.diagonal(whole))
+    values, vectors = np.linalg.eigh(whole / scale[:, None] / scale)
     rows = vectors / np.sqrt(np.maximum(values, 1e-12))
-    scale = np.maximum(scale, 1e-100)  # a coordinate without any answer: enormous, and finite
     return rows @ rows.T / scale[:, None] / scale

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from jaxident.diagnosis.fit.nominal import first_starts
-from jaxident.diagnosis.fit.refit import Data, refit
+from jaxident.diagnosis.fit.refit import WIDE, Data, refit, speeds_up
 from jaxident.diagnosis.motion.windows import cut
 from jaxident.diagnosis.noise.law import Law, white_whitener
-from jaxident.effects.coordinates import neutral_vector, nominal_vector
+from jaxident.effects.coordinates import neutral_vector, nominal_vector, sizes
 from jaxident.log import Log, join
 from jaxident.robot.drive import Physical
 from jaxident.robot.model import Model
@@ -42,7 +42,16 @@ def test_the_gain_of_a_wheel_that_never_passes_its_dead_zone_follows_the_other_w
         fit = refit(data, vector, starts, effects)
         vector, starts = fit.vector, fit.starts
         assert np.isfinite(fit.cost)
-        assert np.all(np.isfinite(fit.covariance))
+        assert np.all(np.diagonal(fit.covariance) <= 1.001 * (WIDE * sizes()[fit.places]) ** 2)
     right, left = vector[[2, 4]], vector[[3, 5]]
     assert vector[7] > 0.3, "no command passes the left dead zone: otherwise this test shows nothing"
     assert left == pytest.approx(right * np.array([1.0, -1.0]), rel=1e-3)
+
+
+def test_a_robot_whose_coupling_outdoes_its_rates_speeds_up_by_itself():
+    """Against the eigenvalues of its speeds' equation."""
+    for coupling in ((0.0, 0.0), (2.0, 5.0), (2.0, 8.0), (-3.0, 6.0), (-3.0, -6.0)):
+        drive = DRIVE._replace(coupling=np.array(coupling))
+        system = np.diag(-np.asarray(drive.rate)) + np.array([[0.0, coupling[0]], [coupling[1], 0.0]])
+        grows = np.linalg.eigvals(system).real.max() > 0.0
+        assert speeds_up(neutral_vector(nominal_vector(drive, np.zeros(2)))) == grows

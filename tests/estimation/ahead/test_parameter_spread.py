@@ -71,3 +71,22 @@ def test_predictions_spread_as_robots_do():
     bare = dataclasses.replace(model, covariance=model.covariance[:2, :2], parameter_order=model.parameter_order[:2])
     without = run_ahead(bare, log, starts, 30, burn_in=20, session_time=0.0).parameters[:, :, -1]
     assert np.sum(without[..., :2] ** 2) < 0.5 * np.sum(told[..., :2] ** 2)  # else the law's values would not be seen
+
+
+def test_a_parameter_at_its_bound_is_moved_by_a_fair_step():
+    """One of 0 has no size of its own: the step is that of a clear case, far above what differences are good to."""
+    law = Effect("quadratic_drag", {"along": 0.0, "heading": 0.5})
+    model = dataclasses.replace(uncertain(), discovered=(), effects=(law,), covariance=np.diag([0.05, 0.3]) ** 2,
+                                parameter_order=("rate_1", "quadratic_drag.along"))  # fmt: skip
+    assert min(size for _, size in directions(model)) > 1e-5
+    log = ji.simulate(dataclasses.replace(model, noise=None), ji.make_log(STEP * np.arange(90), *np.ones((2, 90))))
+    log = type(log)(*map(np.asarray, log))
+    starts = type(every(log, 20, 60))(np.zeros(1, int), np.array([20]))
+    told = run_ahead(model, log, starts, 30, burn_in=20, session_time=0.0).parameters[:, 0, -1]
+    values = {"rate_1": 0.05, "quadratic_drag.along": 0.3}
+    bare = dataclasses.replace(model, covariance=None, parameter_order=())
+    here = run_ahead(bare, log, starts, 30, burn_in=20, session_time=0.0).pose[0, -1]
+    for name, deviation in values.items():
+        other = with_values(bare, {name: parameter_values(model)[name] + 0.1 * deviation})
+        moved = 10.0 * (run_ahead(other, log, starts, 30, burn_in=20, session_time=0.0).pose[0, -1] - here)
+        assert np.min(np.linalg.norm(np.abs(told) - np.abs(moved), axis=1)) < 0.15 * np.linalg.norm(moved)
