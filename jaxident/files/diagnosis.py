@@ -56,8 +56,14 @@ def _wheels(told: Odometry) -> dict[str, Any]:
         "radius": told.sensor.radius,
         "track": told.sensor.track,
         "windows": told.starts,
-        "rms": {name: {"position": 1e3 * own[0], "heading": 1e3 * own[1]} for name, own in told.rms.items()},
+        "rms": _in_thousandths(told.rms),
+        "median": _in_thousandths(told.median),
     }
+
+
+def _in_thousandths(errors: dict[str, tuple[float, float]]) -> dict[str, dict[str, float]]:
+    """Errors in position [m] and heading [rad] as mm and mrad."""
+    return {name: {"position": 1e3 * own[0], "heading": 1e3 * own[1]} for name, own in errors.items()}
 
 
 def _law(shown: Shown) -> dict[str, Any]:
@@ -117,10 +123,7 @@ def _gap(gap: Gap) -> dict[str, Any]:
         "floor": {"value": gap.floor, "interval": list(gap.floor_interval)},
         "shrink": gap.shrink.value,
         "shrink_interval": _listed(gap.shrink.interval),
-        "rms": {
-            name: {"position": 1e3 * position, "heading": 1e3 * heading}
-            for name, (position, heading) in gap.rms.items()
-        },
+        "rms": _in_thousandths(gap.rms),
         "run_up": gap.run_up,
         "placebo": placebo,
     }

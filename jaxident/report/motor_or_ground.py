@@ -3,7 +3,7 @@
 import numpy as np
 
 from jaxident import plot
-from jaxident.diagnosis.account.odometry import Odometry, steps_of_poses, steps_of_wheels
+from jaxident.diagnosis.account.odometry import Odometry, steps_of_poses, steps_of_run, steps_of_wheels
 from jaxident.diagnosis.diagnose import Diagnosis
 from jaxident.report.page import PHONE, Figure, Section, Table
 from jaxident.report.words import angle, error, length, plain_text
@@ -19,9 +19,12 @@ def motor_or_ground(found: Diagnosis) -> list[Section]:
     told = found.odometry
     if told is None:
         return []
-    rows = [(HEADS[name], length(own[0]), angle(own[1])) for name, own in told.rms.items()]
-    caption = f"Root mean square errors {found.gap.horizon:.3g} s ahead, from the same {told.starts} places."
-    table = Table(("prediction", "position", "heading"), rows, caption)
+    rows = [
+        (HEADS[name], length(own[0]), angle(own[1]), *(length(told.median[name][0]), angle(told.median[name][1])))
+        for name, own in told.rms.items()
+    ]
+    caption = f"Errors {found.gap.horizon:.3g} s ahead, from the same {told.starts} places: root mean squares, medians."
+    table = Table(("prediction", "position", "heading", "median position", "median heading"), rows, caption)
     text = TEXT.format(radius=length(told.sensor.radius), track=length(told.sensor.track))
     return [Section("Motor or ground", [text, *_picture(found, told), table])]
 
@@ -42,11 +45,11 @@ def wheels_line(found: Diagnosis) -> list[str]:
     """The same as a line for terminals."""
     if found.odometry is None:
         return []
-    rms = found.odometry.rms
+    own = found.odometry.median
     return [
         plain_text(
-            f"motor or ground: {error(rms['wheels'])} for a robot that moves as its wheels turned, "
-            f"{error(rms['nominal'])} for the nominal model"
+            f"motor or ground (median errors): {error(own['wheels'])} for a robot that moves as its wheels turned, "
+            f"{error(own['nominal'])} for the nominal model"
         )
     ]
 
@@ -71,8 +74,9 @@ def _picture(found: Diagnosis, told: Odometry) -> list[Figure]:
     if np.array_equal(found.gap.paths[0], found.gap.paths[1], equal_nan=True):
         del models[HEADS["corrected"]]
     figure, axes = plot.figure(3, 1, size=(PHONE, 4.6), share_x=True)
-    ground = steps_of_poses(np.stack(own.pose)) / np.diff(t)
-    plot.wheel_speeds(t[1:], ground, rims, np.stack(own.command)[:, :-1], modelled=models, axes=axes)
+    seen, moved = steps_of_run(own)
+    ground = t[seen][1:], moved / np.diff(t[seen])
+    plot.wheel_speeds(ground, (t[1:], rims), (t, np.stack(own.command)), modelled=models, axes=axes)
     return [Figure(plot.image(figure), "Commands, wheels and motion of the worst stretch", PICTURE)]
 
 

@@ -64,7 +64,8 @@ def test_increments_are_drawn_in_millimetres_and_milliradians(increment):
 def test_wheel_speeds_stand_between_the_command_and_the_motion():
     t, one = np.arange(10.0), np.ones((2, 10))
     _, axes = plot.figure(3, 1)
-    plot.wheel_speeds(t, one, 2.0 * one, 3.0 * one, modelled={"nominal model": (t[5:], 4.0 * one[:, 5:])}, axes=axes)
+    plot.wheel_speeds((t, one), (t, 2.0 * one), (t, 3.0 * one),
+                      modelled={"nominal model": (t[5:], 4.0 * one[:, 5:])}, axes=axes)  # fmt: skip
     assert [line.get_label() for line in axes[1].lines] == ["robot (poses)", "wheels", "nominal model"]
     np.testing.assert_array_equal(curve(axes[0], "wheels").get_ydata(), 2.0 * one[0])
     np.testing.assert_array_equal(curve(axes[2], "left").get_ydata(), 3.0 * one[1])

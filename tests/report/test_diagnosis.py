@@ -306,7 +306,7 @@ def with_wheels(found):
     log, paths = found.prepared.log, found.gap.paths
     turned = 10.0 + 0.0 * log.t
     rms = {"nominal": (0.04, 0.03), "corrected": (0.004, 0.005), "wheels": (0.005, 0.006)}
-    told = Odometry(WheelSensor(0.03, 0.1), np.zeros(paths.shape[1:]), rms, 28)
+    told = Odometry(WheelSensor(0.03, 0.1), np.zeros(paths.shape[1:]), rms, rms, 28)
     prepared = found.prepared._replace(log=log._replace(wheel_r=turned, wheel_l=turned))
     return found._replace(odometry=told, prepared=prepared)
 
@@ -317,8 +317,8 @@ def test_logs_with_wheel_speeds_have_a_section_on_motor_and_ground():
     assert "radius of 30 mm and track of 100 mm" in plain_spaces(one.blocks[0])
     assert [plain_spaces(row[1]) for row in tables(one)[0].rows] == ["40 mm", "4 mm", "5 mm"]
     assert wheels_line(found) == [
-        "motor or ground: 5 mm and 6 mrad for a robot that moves as its wheels turned, 40 mm and 30 mrad for the "
-        "nominal model"
+        "motor or ground (median errors): 5 mm and 6 mrad for a robot that moves as its wheels turned, 40 mm and 30 "
+        "mrad for the nominal model"
     ]
     assert diagnosis_to_dict(found)["wheels"]["rms"]["wheels"] == {"position": 5.0, "heading": 6.0}
 

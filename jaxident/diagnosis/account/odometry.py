@@ -19,13 +19,14 @@ from jaxident.robot.wheel_sensor import WheelSensor
 class Odometry(NamedTuple):
     """sensor: radius and track [m] by which the wheel speeds of the rows that fit show their motion best. paths
     (starts, rows, 3): the poses that measured wheels make of each judging start, NaN where a wheel speed is missing.
-    rms: root mean squares of position [m] and heading [rad] at the end, of the `nominal` and the `corrected` model, of
-    the `wheels`, and of `wheels_late` where the corrected model has a camera that reports late: the wheels as late as
-    the poses; all over the same `starts`."""
+    rms, median: of the errors in position [m] and heading [rad] at the end, of the `nominal` and the `corrected` model,
+    of the `wheels`, and of `wheels_late` where the corrected model has a camera that reports late: the wheels as late
+    as the poses; all over the same `starts`."""
 
     sensor: WheelSensor
     paths: Any
     rms: dict[str, tuple[float, float]]
+    median: dict[str, tuple[float, float]]
     starts: int
 
 
@@ -36,7 +37,7 @@ def odometry(prepared: Prepared, paths: Array, corrected: Model) -> Odometry | N
     if prepared.windows.wheels is None or not len(prepared.judging.row):
         return None
     late = sum(sum(effect.parameters.values()) for effect in corrected.effects if effect.name in POSES_ONLY)
-    sensor = sensor_by_steps(beside_poses(prepared.fitted, late))
+    sensor = sensor_by_stretches(beside_poses(prepared.fitted, late), prepared.rows)
     if sensor is None:
         return None
     log, begins = prepared.log, run_begins(prepared.log)[prepared.judging.run] + prepared.judging.row
@@ -56,7 +57,8 @@ def odometry(prepared: Prepared, paths: Array, corrected: Model) -> Odometry | N
     if not kept.any():
         return None
     rms = {name: tuple(np.sqrt(np.mean(each[kept] ** 2, axis=0)).tolist()) for name, each in missed.items()}
-    return Odometry(sensor, own, rms, int(kept.sum()))
+    median = {name: tuple(np.median(np.abs(each[kept]), axis=0).tolist()) for name, each in missed.items()}
+    return Odometry(sensor, own, rms, median, int(kept.sum()))
 
 
 def beside_poses(log: Log, late: float) -> Log:
@@ -76,24 +78,40 @@ def _missed(measured: Array, pose: Array) -> np.ndarray:
     return np.stack([np.hypot(away[:, 0], away[:, 1]), turn], axis=1)
 
 
-def sensor_by_steps(log: Log) -> WheelSensor | None:
-    """Radius and track [m] by regression of how far and by how much the robot moves from row to row on how far its
-    wheels turn meanwhile. None where these never turn together, or never against each other."""
-    moved, turned = [], []
-    for run in log.runs():
-        both, parts = (
-            steps_of_wheels(np.asarray(run.t), np.stack([run.wheel_r, run.wheel_l])),
-            steps_of_poses(np.stack(run.pose)),
-        )
-        kept = np.isfinite(both).all(axis=0) & np.isfinite(parts).all(axis=0)
-        moved.append(parts[:, kept])
-        turned.append(both[:, kept])
-    (along, turn), (together, against) = np.concatenate(moved, axis=1), np.concatenate(turned, axis=1)
+def sensor_by_stretches(log: Log, rows: int) -> WheelSensor | None:
+    """Radius and track [m] by regression of how far and by how much the robot moves on how far its wheels turn
+    meanwhile, both added up over stretches of some rows: over one row the camera's clock and error would rule. None
+    where the wheels never turn together, or never against each other."""
+    parts = [_added_up(run, rows) for run in log.runs()]
+    (along, turn), (together, against) = (np.concatenate(each, axis=1) for each in zip(*parts, strict=True))
     whole, across = float(together @ together), float(against @ against)
     if not (whole > 0.0 and across > 0.0):
         return None
     radius, ratio = float(together @ along) / whole, float(against @ turn) / across
     return WheelSensor(radius, radius / ratio) if radius > 0.0 and ratio > 0.0 else None
+
+
+def _added_up(run: Log, rows: int) -> tuple[np.ndarray, np.ndarray]:
+    """How far the robot of a run moves and turns, and how far its wheels turn meanwhile, added up over stretches of
+    rows (2, stretches); a step between two poses counts where no wheel speed is missing."""
+    seen, moved = steps_of_run(run)
+    turned = steps_of_wheels(np.asarray(run.t), np.stack([run.wheel_r, run.wheel_l]))
+    known = np.isfinite(turned).all(axis=0)
+    total = np.cumsum(np.pad(np.where(known, turned, 0.0), ((0, 0), (1, 0))), axis=1)
+    holes = np.cumsum(np.append(0, ~known))
+    kept = np.diff(holes[seen]) == 0
+    places, count = seen[1:][kept] // rows, len(run.t) // rows + 1
+    steps = moved[:, kept], np.diff(total[:, seen], axis=1)[:, kept]
+    sums = [np.stack([np.bincount(places, each, count) for each in both]) for both in steps]
+    return sums[0], sums[1]
+
+
+def steps_of_run(run: Log) -> tuple[np.ndarray, np.ndarray]:
+    """The rows (n,) of a run that have a pose, and distance along the mean heading [m] and turn [rad] from each to the
+    next (2, n - 1)."""
+    pose = np.stack([np.asarray(column, float) for column in run.pose])
+    seen = np.flatnonzero(np.isfinite(pose).all(axis=0))
+    return seen, steps_of_poses(pose[:, seen])
 
 
 def steps_of_wheels(t: Array, speeds: Array) -> np.ndarray:
@@ -104,8 +122,7 @@ def steps_of_wheels(t: Array, speeds: Array) -> np.ndarray:
 
 
 def steps_of_poses(pose: Array) -> np.ndarray:
-    """Distance along the mean heading [m] and turn [rad] from row to row (2, rows - 1) of poses (3, rows); NaN beside
-    missing ones."""
+    """Distance along the mean heading [m] and turn [rad] from row to row (2, rows - 1) of poses (3, rows)."""
     x, y, theta = pose
     turn = (np.diff(theta) + np.pi) % (2.0 * np.pi) - np.pi
     middle = theta[:-1] + 0.5 * turn

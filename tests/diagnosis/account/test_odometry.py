@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import jaxident as ji
-from jaxident.diagnosis.account.odometry import beside_poses, follow_wheels, odometry, sensor_by_steps
+from jaxident.diagnosis.account.odometry import beside_poses, follow_wheels, odometry, sensor_by_stretches
 from jaxident.estimation.ahead.stretches import Starts
 from jaxident.log import join
 from jaxident.robot.wheel_sensor import WheelSensor
@@ -96,6 +96,13 @@ def test_nothing_is_told_without_wheels_or_without_motion():
     log, robot = driven()
     assert judged(log, robot, windows=SimpleNamespace(wheels=None)) is None
     assert judged(log, robot, judging=Starts(np.zeros(0, int), np.zeros(0, int))) is None
-    assert sensor_by_steps(log._replace(wheel_r=0.0 * log.t, wheel_l=0.0 * log.t)) is None
+    assert sensor_by_stretches(log._replace(wheel_r=0.0 * log.t, wheel_l=0.0 * log.t), AHEAD) is None
     straight = log._replace(wheel_l=log.wheel_r)
     assert judged(straight, robot, fitted=straight) is None
+
+
+def test_missing_poses_leave_radius_and_track():
+    log, _ = driven()
+    rare = np.arange(len(log.t)) % 3 > 0
+    blind = log._replace(**{name: np.where(rare, np.nan, getattr(log, name)) for name in ("x", "y", "theta")})
+    assert sensor_by_stretches(blind, AHEAD) == pytest.approx(SENSOR, rel=2e-2)
