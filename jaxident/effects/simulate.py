@@ -75,18 +75,23 @@ def is_random(model: Model) -> bool:
 
 
 def _with_wheels(model: Model, log: Log, start: State, key: Array | None, session_time: Array) -> Log:
-    """The log with the wheel speeds of a model that has the sensor: those of its drive, in which nothing slips at
-    random and no camera is late."""
-    parts = frozenset(effect.name for effect in model.effects if not CATALOGUE[effect.name].poses_only)
-    wheels = _wheels(model.dynamics, model.dead_zone, to_vector(model.effects), log, start, key, session_time,
-                     laws_of(model.discovered), model.wheels, substeps=substeps_for(parts), parts=parts)  # fmt: skip
+    """The log with the wheel speeds of a model that has the sensor."""
+    parts = frozenset(effect.name for effect in model.effects)
+    wheels = drive_wheels(model.dynamics, model.dead_zone, to_vector(model.effects), log, start, key, session_time,
+                          laws=laws_of(model.discovered), sensor=model.wheels, substeps=substeps_for(parts),
+                          parts=parts)  # fmt: skip
     return log._replace(wheel_r=wheels.right, wheel_l=wheels.left)
 
 
 @partial(jax.jit, static_argnames=("substeps", "parts"))
-def _wheels(drive, dead_zone, vector, log: Log, start, key, session_time, laws, sensor, *, substeps, parts) -> Wheels:
+def drive_wheels(
+    drive, dead_zone, vector, log: Log, start, key, session_time, *, laws, sensor, substeps, parts
+) -> Wheels:
+    """Measured wheel speeds (samples,) of one run: those of the drive, in which nothing slips at random and no camera
+    is late; arguments as of `full.run_states`."""
+    seen = frozenset(name for name in parts if not CATALOGUE[name].poses_only)
     states, excess = run_states(drive, dead_zone, vector, log.t, log.command, start, noise=None, key=key,
-                                session_time=session_time, substeps=substeps, parts=parts, laws=laws)  # fmt: skip
+                                session_time=session_time, substeps=substeps, parts=seen, laws=laws)  # fmt: skip
     return measure_wheels(sensor, *rim_motion(drive, states.v, states.w, excess), key)
 
 

@@ -59,6 +59,11 @@ method = "batch"            # PAPER section VI
 [[estimators]]
 method = "recursive"        # batch on the setup time, then recursive least squares
 settings = { setup_samples = 100 }              # also forgetting
+
+# [[estimators]]
+# method = "maximum-likelihood"
+# settings = { coupling = true, wheels = true } # coupling: for robots whose speeds change each other, as those of
+                            # "published" do; wheels = false leaves the wheel speeds of robots with `wheels` aside
 """
 
 LARGEST_STUDY = 1 << 20
@@ -218,7 +223,8 @@ def _scaled(model: Model, point: dict[str, float]) -> Model:
     parts = drive._asdict() | {"dead_zone": model.dead_zone}
     moved = {key: None if v is None else point.get(key, 1.0) * np.asarray(v, float) for key, v in parts.items()}
     width = moved.pop("dead_zone")
-    return Model(model.sample_period, Physical(**moved), width, model.noise, model.effects, discovered=model.discovered)
+    return Model(model.sample_period, Physical(**moved), width, model.noise, model.effects, discovered=model.discovered,
+                 wheels=model.wheels)  # fmt: skip
 
 
 def _choice(entry: Any, where: str) -> Choice:

@@ -36,17 +36,17 @@ def bounds(study: Study) -> xarray.DataArray | None:
     if not study.heading_per_position > 0.0 or np.prod(study.shape[:-2]) > MOST_CELLS:
         return None
     noise, found = np.asarray(study.noise, float), np.full((*study.shape[:-1], len(DIFFERENCE_ORDER)), np.nan)
-    slip = any(
-        c.model.noise is not None and c.model.noise.slip_along + c.model.noise.slip_heading for c in study.robots
-    )
+    models = [candidate.model for candidate in study.robots]
+    slip = any(m.noise is not None and m.noise.slip_along + m.noise.slip_heading for m in models)
+    single = not slip and models[0].wheels is None  # without another source of error the bound grows as the noise does
     for place in np.ndindex(study.shape[:-2]):
         at = dict(zip(study.axes, place, strict=False))
         if study.in_force[at["robot"]][at.get("effect", 0)] or study.robots[at["robot"]].model.discovered:
             continue
-        levels = np.flatnonzero(noise) if slip else np.flatnonzero(noise)[:1]
+        levels = np.flatnonzero(noise)[:1] if single else np.flatnonzero(noise)
         for level in levels:
             found[(*place, level)] = _deviation(study, (*place, level), bool(slip))
-        if not slip and len(levels):  # without slip the bound grows as the noise does
+        if single and len(levels):
             found[place] = found[(*place, levels[0])] * np.where(noise > 0.0, noise / noise[levels[0]], np.nan)[:, None]
     return xarray.DataArray(found, dims=(*study.axes[:-1], "parameter"))
 
@@ -57,7 +57,9 @@ def _deviation(study: Study, place: tuple[int, ...], slip: bool) -> np.ndarray:
     index = np.stack([np.full(count, k) for k in place] + [np.arange(count)])
     where, base = cells(study, index), jax.random.key(study.seed)
     kind, rows = study.excitations[place[0]], study.samples[place[1]]
-    law = Law(coupling=where.robot.coupling is not None, memory=study.correlation_time is not None, slip=slip)
+    law = Law(
+        where.robot.coupling is not None, study.correlation_time is not None, slip, where.robot.wheels is not None
+    )
     variances = np.asarray(_variances(base, where, commands(base, where, kind, rows, study.hold), law))
     return np.sqrt(np.mean(np.where(variances > 0.0, variances, np.nan), axis=0))
 
@@ -70,9 +72,11 @@ def _variances(base: Array, where: Cell, command: Wheels, law: Law) -> Array:
         robot = draw_robot(seed_keys(base, cell)[0], cell)
         slips = (0.0, 0.0) if cell.robot.slip is None else cell.robot.slip
         noise = Noise(cell.position, cell.heading, cell.correlation_time, *slips)
-        vector = to_vector(Robot(require_physical(robot), robot.dead_zone, noise), law)
+        vector = to_vector(Robot(require_physical(robot), robot.dead_zone, noise, robot.wheels), law)
         blank = jnp.zeros((1, *jnp.shape(command.right)))
-        runs = Runs(cell.period, Wheels(*(u[None] for u in command)), Pose(blank, blank, blank), blank == 0.0)
+        every = blank == 0.0
+        wheels, turning = (Wheels(blank, blank), Wheels(every, every)) if law.wheels else (None, None)
+        runs = Runs(cell.period, Wheels(*(u[None] for u in command)), Pose(blank, blank, blank), every, wheels, turning)
         covariance = bound_covariance(vector, jnp.asarray(AT_REST, float), runs, law)
         return jnp.diagonal(difference_covariance(vector, covariance, cell.period, law))
 

@@ -127,6 +127,7 @@ def _parts(model: Any) -> dict[str, Any]:
     slip = None if noise is None else [float(noise.slip_along), float(noise.slip_heading)]
     plain = lists | {"dead_zone": np.asarray(model.dead_zone, float).tolist(), "slip": slip}
     plain |= {"effects": _sizes(model.effects)} if model.effects else {}
+    plain |= {"wheels": list(map(float, model.wheels))} if model.wheels else {}
     return plain | ({"discovered": [_law(law) for law in model.discovered]} if model.discovered else {})
 
 

@@ -130,6 +130,7 @@ def check_study(study: Study, where: str = "study") -> None:
     duration = (min(study.samples) - 1) * min(study.period)
     for candidate in study.robots:
         _check_candidate(candidate, f"{where}: robot {candidate.name!r}", duration)
+    _check_wheels([candidate.model for candidate in study.robots], f"{where}: robots")
     for one in study.effects:
         _check_set(one, study.robots, f"{where}: effects: {one.name!r}", duration)
     for choice in study.estimators:
@@ -188,6 +189,14 @@ def _check_candidate(candidate: Candidate, where: str, duration: float) -> None:
     bad = next((width for width in candidate.spread if not 0.0 <= width < 1.0), None)
     if bad is not None:
         raise InputError(f"{where}: spread: {bad:g} should be at least 0 and below 1")
+
+
+def _check_wheels(models: Sequence[Model], where: str) -> None:
+    sensors = [model.wheels for model in models if model.wheels is not None]
+    if sensors and len(sensors) < len(models):
+        raise InputError(f"{where}: {len(sensors)} of {len(models)} measure their wheels; all should, or none")
+    if any(not float(sensor.noise) > 0.0 for sensor in sensors):
+        raise InputError(f"{where}: wheels: noise should be above 0; without noise their speeds would outweigh all")
 
 
 def _check_set(one: EffectSet, robots: Sequence[Candidate], where: str, duration: float) -> None:

@@ -16,6 +16,7 @@ from jaxident.numerics import require_float64
 from jaxident.parallel import in_parallel, trials_at_once
 from jaxident.robot.excitation import EXCITATIONS
 from jaxident.robot.model import Model, require_physical
+from jaxident.robot.wheel_sensor import WheelSensor
 from jaxident.study.design import PARTS, Study
 from jaxident.study.estimators import runs_alone
 from jaxident.study.trial import Cell, Outcome, Plan, Recording, Robot, commands, record, run_trial
@@ -195,7 +196,13 @@ def _robots(study: Study, robot: np.ndarray, effect: np.ndarray) -> Robot:
         np.array([candidate.spread for candidate in study.robots], float).reshape(-1, len(PARTS))[robot],
         None if vectors is None else np.array(vectors, float)[robot, effect],
         _laws(models, robot) if any(model.discovered for model in models) else None,
+        None if any(model.wheels is None for model in models) else _sensors(models, robot),
     )
+
+
+def _sensors(models: Sequence[Model], robot: np.ndarray) -> WheelSensor:
+    """The sensors of wheel speeds of trials (trials,) whose places among the robots are given."""
+    return WheelSensor(*(np.array([m.wheels[k] for m in models if m.wheels], float)[robot] for k in range(3)))
 
 
 def _laws(models: Sequence[Model], robot: np.ndarray) -> Laws:

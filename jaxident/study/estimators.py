@@ -51,13 +51,15 @@ class Sight(NamedTuple):
     """What an estimator sees of a trial: one even run without gaps, arrays (samples,), and what can be had from it.
 
     observations leave out the first sample, whose command before is unknown. setup(rows, reading, d_max) gives the
-    start values from the first rows; estimators that ask for the same share the work.
+    start values from the first rows; estimators that ask for the same share the work. wheels: measured wheel speeds,
+    None of robots without.
     """
 
     log: Log
     observations: Observations
     setup: Callable[[int, str, Array], Setup]
     largest: Array
+    wheels: Wheels | None = None
 
 
 class Finding(NamedTuple):
@@ -120,8 +122,8 @@ def check_choice(choice: Choice, where: str) -> None:
             raise InputError(f"{where}: {key}: is {value!r}; {known[key].right}")
 
 
-def see(command: Wheels, pose: Pose, period: Array) -> Sight:
-    """What estimators see of commands and measured poses (samples,) at an even period [s]."""
+def see(command: Wheels, pose: Pose, period: Array, wheels: Wheels | None = None) -> Sight:
+    """What estimators see of commands, measured poses and, if any, wheel speeds (samples,) at an even period [s]."""
     rows = jnp.arange(len(pose.x))
     log = Log(rows * period, *command, *pose, jnp.zeros_like(rows))
 
@@ -131,7 +133,7 @@ def see(command: Wheels, pose: Pose, period: Array) -> Sight:
         return initialise(early, d_max=d_max_share * largest, reading=reading)
 
     largest = jnp.max(jnp.abs(jnp.stack(command)))
-    return Sight(log, complete_observations(command, path_length(pose)), setup, largest)
+    return Sight(log, complete_observations(command, path_length(pose)), setup, largest, wheels)
 
 
 def estimate(choice: Choice, sight: Sight, moves: Array) -> Finding:
@@ -171,11 +173,13 @@ def recursively(sight: Sight, settings: dict[str, Any]) -> Finding:
 
 
 def likelihood(sight: Sight, settings: dict[str, Any]) -> Finding:
-    """Maximum likelihood on the poses under white camera noise, in physical parameters."""
-    log, law = sight.log, Law()
-    period = log.t[1] - log.t[0]
-    command, pose = jax.tree.map(lambda column: column[None], (log.command, log.pose))
-    runs = Runs(period, command, pose, jnp.ones((1, len(log.t)), bool))
+    """Maximum likelihood on the poses, and on wheel speeds where there are some, under white noise of camera and
+    wheels, in physical parameters."""
+    log, wheels = sight.log, sight.wheels if settings["wheels"] else None
+    law, period = Law(settings["coupling"], wheels=wheels is not None), log.t[1] - log.t[0]
+    command, pose, wheels = jax.tree.map(lambda column: column[None], (log.command, log.pose, wheels))
+    every = jnp.ones((1, len(log.t)), bool)
+    runs = Runs(period, command, pose, every, wheels, None if wheels is None else Wheels(every, every))
     fit = fit_runs(runs, settings["d_max_share"] * sight.largest, law)
     covariance = difference_covariance(to_vector(fit.robot, law), fit.covariance, period, law)
     estimate = difference_vector(to_difference(fit.robot.drive, period), fit.robot.dead_zone)
@@ -232,6 +236,10 @@ _PAPER = {
     "d_max_share": Setting(D_MAX_SHARE, _number(0.0, 0.999), "a number above 0 and below 1"),
 }
 _WHOLE = {"d_max_share": _PAPER["d_max_share"]}
+_POSES = {
+    "wheels": Setting(True, lambda value: isinstance(value, bool), "true, or false for the poses alone"),
+    "coupling": Setting(False, lambda value: isinstance(value, bool), "true for robots whose speeds change each other"),
+}
 BEST = "maximum-likelihood"
 """The method whose errors come near the Cramér-Rao bound."""
 METHODS = {
@@ -242,6 +250,6 @@ METHODS = {
     ),
     "key-term-least-squares": Method(key_terms, _WHOLE),
     "instrumental-variables": Method(instrumental, _WHOLE),
-    BEST: Method(likelihood, _WHOLE, alone=True),
+    BEST: Method(likelihood, _WHOLE | _POSES, alone=True),
 }
 """Every estimator by name."""

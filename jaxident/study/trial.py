@@ -17,18 +17,22 @@ import jax.numpy as jnp
 from jaxident.array_types import AT_REST, Array, Pose, Wheels
 from jaxident.effects.catalogue import NEUTRAL
 from jaxident.effects.full import disturb, run_undisturbed, substeps_for
+from jaxident.effects.simulate import drive_wheels
+from jaxident.log import make_log
 from jaxident.robot.drive import Physical
 from jaxident.robot.excitation import EXCITATIONS
 from jaxident.robot.model import Model, difference_vector
 from jaxident.robot.noise import Noise, draw_noise, observe
 from jaxident.robot.simulate import run_physical
+from jaxident.robot.wheel_sensor import measure_wheels
 from jaxident.study.estimators import Choice, estimate, see
 
 
 class Robot(NamedTuple):
     """Parts of a robot: rate (2,), gain (2, 2), coupling (2,) or None, dead_zone (2,), slip (2,) along and in heading
     or None; spread (4,): the largest relative departure of each part, drawn anew for each seed; effects (parameters,):
-    the catalogue's vector, or None where no trial of the study has any; laws: discovered ones, or None likewise."""
+    the catalogue's vector, or None where no trial of the study has any; laws: discovered ones, or None likewise;
+    wheels: the sensor of wheel speeds, or None for robots that measure none."""
 
     rate: Any
     gain: Any
@@ -38,6 +42,7 @@ class Robot(NamedTuple):
     spread: Any
     effects: Any
     laws: Any
+    wheels: Any = None
 
 
 class Cell(NamedTuple):
@@ -74,12 +79,13 @@ class Outcome(NamedTuple):
 
 class Recording(NamedTuple):
     """What a trial's estimators are given, and what is true: commands and poses (samples,), the robot. The exact poses
-    hold everything but the camera's random errors."""
+    hold everything but the camera's random errors. wheels: measured wheel speeds, None of robots without."""
 
     command: Wheels
     measured: Pose
     exact: Pose
     robot: Model
+    wheels: Wheels | None = None
 
 
 def seed_keys(base: Array, cell: Cell) -> tuple[Array, Array, Array]:
@@ -110,12 +116,22 @@ def record(base: Array, cell: Cell, command: Wheels, effects: frozenset[str] = f
     if not effects and cell.robot.laws is None:
         unit = draw_noise(key, len(command.right))
         exact = run_physical(robot, command, cell.period, AT_REST, unit).pose
-        return Recording(command, observe(exact, law, unit, cell.period), exact, robot)
+        wheels = None
+        if robot.wheels is not None:
+            drive = run_physical(robot, command, cell.period, AT_REST)  # random slip comes after the wheel
+            wheels = measure_wheels(robot.wheels, drive.v, drive.w, key)
+        return Recording(command, observe(exact, law, unit, cell.period), exact, robot, wheels)
     t, vector = cell.period * jnp.arange(len(command.right)), cell.robot.effects
     vector = NEUTRAL if vector is None else vector
+    settings: Any = {"substeps": substeps_for(effects), "parts": effects, "laws": cell.robot.laws}
     exact = run_undisturbed(robot.dynamics, robot.dead_zone, vector, t, command, AT_REST, noise=robot.noise, key=key,
-                            substeps=substeps_for(effects), parts=effects, laws=cell.robot.laws)  # fmt: skip
-    return Recording(command, disturb(exact, vector, t, noise=law, key=key, parts=effects), exact, robot)
+                            **settings)  # fmt: skip
+    wheels = None
+    if robot.wheels is not None:
+        made = make_log(t, *command)
+        wheels = drive_wheels(robot.dynamics, robot.dead_zone, vector, made, AT_REST, key, 0.0, sensor=robot.wheels,
+                              **settings)  # fmt: skip
+    return Recording(command, disturb(exact, vector, t, noise=law, key=key, parts=effects), exact, robot, wheels)
 
 
 def draw_robot(key: Array, cell: Cell) -> Model:
@@ -127,14 +143,14 @@ def draw_robot(key: Array, cell: Cell) -> Model:
         for k, part, width in zip(jax.random.split(key, 4), parts, values.spread, strict=True)
     )
     noise = None if values.slip is None else Noise(slip_along=values.slip[0], slip_heading=values.slip[1])
-    return Model(cell.period, Physical(rate, gain, coupling), dead_zone, noise)
+    return Model(cell.period, Physical(rate, gain, coupling), dead_zone, noise, wheels=values.wheels)
 
 
 def run_trial(plan: Plan, base: Array, cell: Cell, command: Wheels) -> Outcome:
     """One trial: what every estimator makes of one noisy recording."""
     made = record(base, cell, command, plan.effects)
     moves = jnp.any(jnp.stack([jnp.ptp(column) for column in made.exact]) > 0.0)
-    sight = see(made.command, made.measured, cell.period)
+    sight = see(made.command, made.measured, cell.period, made.wheels)
     found = [estimate(choice, sight, moves) for choice in plan.estimators]
     estimates, deviations, reasons = (jnp.stack(part) for part in zip(*found, strict=True))
     return Outcome(estimates, deviations, difference_vector(made.robot.difference, made.robot.dead_zone), reasons)

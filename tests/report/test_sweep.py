@@ -1,6 +1,7 @@
 """The page and the table of a study, from invented trials."""
 
 import csv
+import dataclasses
 
 import pytest
 from support.studies import SMALL, UNDER_EFFECTS
@@ -8,6 +9,7 @@ from support.trials import invented
 
 from jaxident.files.summary import write_summary
 from jaxident.report.sweep import SINGLE, what_next, write_study
+from jaxident.study.estimators import Choice
 from jaxident.study.statistics import summarise
 
 
@@ -45,6 +47,22 @@ def test_what_to_do_next():
     assert next_step(bound=210.0).startswith("These errors are 210 times the least that the logs allow")
     assert '`method = "maximum-likelihood"`' in next_step(bound=210.0)
     assert next_step(broken=1).startswith("Find out why")
+
+
+def test_coupling_is_asked_for_where_a_robot_has_it():
+    """The published robot has; maximum likelihood that does not look for it is far from the bound."""
+    assert "with `settings = { coupling = true }`" in next_step(bound=210.0)
+    trials = invented(SMALL)
+    summary = summarise(trials)
+    summary["rmse_over_bound"] = 0.0 * summary["rmse"] + 30.0
+    (name,) = map(str, summary["estimator"].values)
+    plain = Choice(name, "maximum-likelihood")
+    assert "coupling = true" in what_next(SMALL._replace(estimators=(plain,)), summary)
+    looking = plain._replace(settings=(("coupling", True),))
+    assert what_next(SMALL._replace(estimators=(looking,)), summary) == SINGLE
+    still = dataclasses.replace(SMALL.robots[0].model, dynamics=SMALL.robots[0].model.physical._replace(coupling=None))
+    alone = SMALL._replace(estimators=(plain,), robots=(SMALL.robots[0]._replace(model=still),))
+    assert what_next(alone, summary) == SINGLE
 
 
 def test_the_first_screen_shows_what_breaks(tmp_path):
