@@ -29,6 +29,10 @@ NEEDED = "give --commands CSV --poses CSV, or --bag PATH, or --log LOG"
 )
 @click.option("--wheels-topic", metavar="T", help="JointState whose velocities are measured wheel speeds [rad/s].")
 @click.option("--wheel-joints", type=ORDER, help="Which joints of --wheels-topic are the wheels, the right one first.")
+@click.option("--wheel-ticks", type=above_zero, metavar="N", help="The wheel columns hold counts, N to a turn of the "
+              "wheel. Of --wheels-topic the joints' positions are taken (N = 6.283185 for radians).")  # fmt: skip
+@click.option("--wheel-counter", type=above_zero, metavar="M", help="The number at which these counts begin again at "
+              "zero, such as 65536.")  # fmt: skip
 @click.option("--child-frame", metavar="F", help="In a tf topic, the frame that moves with the robot.")
 @click.option("--pose-frames", type=FRAMES, help="Compose tf from a fixed frame to the robot's, as in "
               "map,base_link.")  # fmt: skip
@@ -103,7 +107,7 @@ def _counted(log) -> str:
 
 STREAMS_ALONE = ("track", "hold_timeout", "command_columns", "pose_columns", "command_topic", "pose_topic",
                  "child_frame", "pose_frames", "wheel_order", "bag_time", "wheels", "wheels_columns", "wheels_topic",
-                 "wheel_joints")  # fmt: skip
+                 "wheel_joints", "wheel_ticks", "wheel_counter")  # fmt: skip
 """Options that a finished log has no use for."""
 
 
@@ -121,6 +125,10 @@ def _check_sources(chosen) -> None:
         raise click.UsageError("--wheels-topic and --wheel-joints are for --bag PATH; beside CSV give --wheels CSV")
     if chosen["wheel_joints"] and not chosen["wheels_topic"]:
         raise click.UsageError("--wheel-joints names joints of --wheels-topic T, which is missing")
+    if chosen["wheel_ticks"] and not (chosen["wheels"] or chosen["wheels_topic"]):
+        raise click.UsageError("--wheel-ticks tells of --wheels CSV or --wheels-topic T, which is missing")
+    if chosen["wheel_counter"] and not chosen["wheel_ticks"]:
+        raise click.UsageError("--wheel-counter tells of counts: give --wheel-ticks N as well")
     if chosen["listing"] and not chosen["bag"]:
         raise click.UsageError("--list shows the topics of --bag PATH")
     foreign = next((name for name in STREAMS_ALONE if chosen["log"] and chosen[name]), None)
@@ -152,9 +160,10 @@ def _from_streams(chosen):
     given, seen, notes = _from_bag(chosen) if chosen["bag"] else _from_files(chosen)
     offset, told = _offset(chosen, lambda: estimate_offset(given, seen, chosen["track"]))
     settings = {name: chosen[name] for name in ("period", "track", "hold_timeout")}
-    log = merge(given, seen, wheels=_wheels(chosen), pose_offset=offset, **settings)
+    wheels, fine = _wheels(chosen)
+    log = merge(given, seen, wheels=wheels, pose_offset=offset, **settings)
     log, wheels_told = _moved_wheels(chosen, log)
-    return log, offset, (*notes, *told, *wheels_told)
+    return log, offset, (*notes, *told, *fine, *wheels_told)
 
 
 def _moved_wheels(chosen, log):
@@ -170,16 +179,22 @@ def _moved_wheels(chosen, log):
 
 
 def _wheels(chosen):
-    """The stream of measured wheel speeds, or None."""
+    """The stream of measured wheel speeds, or None; and a line on how fine counts are."""
     from jaxident.files.bags import read_bag_wheels
     from jaxident.files.streams import read_wheels
+    from jaxident.files.ticks import speeds_of_counts
 
     columns = chosen["columns"] | chosen["wheels_columns"]
     if chosen["wheels"]:
-        return read_wheels(chosen["wheels"], columns)
-    if chosen["wheels_topic"]:
-        return read_bag_wheels(chosen["bag"], chosen["wheels_topic"], _choice(chosen), columns)
-    return None
+        found = read_wheels(chosen["wheels"], columns)
+    elif chosen["wheels_topic"]:
+        found = read_bag_wheels(chosen["bag"], chosen["wheels_topic"], _choice(chosen), columns)
+    else:
+        return None, ()
+    if chosen["wheel_ticks"] is None:
+        return found, ()
+    found, line = speeds_of_counts(found, chosen["wheel_ticks"], chosen["wheel_counter"])
+    return found, (line,)
 
 
 def _offset(chosen, estimate):
@@ -211,7 +226,7 @@ def _choice(chosen):
     from jaxident.files.messages import Choice
 
     names = ("child_frame", "wheel_order", "bag_time", "pose_frames", "wheel_joints")
-    return Choice(*(chosen[name] for name in names))
+    return Choice(*(chosen[name] for name in names))._replace(positions=chosen["wheel_ticks"] is not None)
 
 
 def _list(bag) -> None:

@@ -20,13 +20,15 @@ MEASURED_COLUMNS = ("wheel_r", "wheel_l")
 class Choice(NamedTuple):
     """What a topic alone does not say: the child frame of a transform, index or joint name of the right and the left
     wheel among the commands, whether the time of recording counts in place of the header's stamp, the frames between
-    which transforms are composed, the robot's last, and the right and the left joint among measured wheel speeds."""
+    which transforms are composed, the robot's last, the right and the left joint among measured wheel speeds, and
+    whether positions of joints are read in place of velocities."""
 
     child_frame: str | None = None
     wheel_order: tuple[str, str] | None = None
     bag_time: bool = False
     frames: tuple[str, str] | None = None
     wheel_joints: tuple[str, str] | None = None
+    positions: bool = False
 
 
 class Reading(NamedTuple):
@@ -80,24 +82,27 @@ def _index(word: str) -> int:
 
 def read_joints(message: Any, choice: Choice) -> Iterator[Reading]:
     """sensor_msgs/JointState as commands: velocities of two joints, named by `wheel_order` or saying right and left."""
-    yield _velocities(message, choice.wheel_order, "--wheel-order")
+    yield _of_joints(message, "velocity", choice.wheel_order, "--wheel-order")
 
 
 def read_measured_joints(message: Any, choice: Choice) -> Iterator[Reading]:
-    """sensor_msgs/JointState as measured wheel speeds; joints as `wheel_joints` names them."""
-    yield _velocities(message, choice.wheel_joints, "--wheel-joints")
+    """sensor_msgs/JointState as measured wheel speeds, or as positions; joints as `wheel_joints` names them."""
+    field = "position" if choice.positions else "velocity"
+    yield _of_joints(message, field, choice.wheel_joints, "--wheel-joints")
 
 
-def _velocities(message: Any, order: tuple[str, str] | None, option: str) -> Reading:
+def _of_joints(message: Any, field: str, order: tuple[str, str] | None, option: str) -> Reading:
     joints = list(message.name)
     order = order or (_only("right", joints, option), _only("left", joints, option))
     for joint in order:
         if joint not in joints:
             raise InputError(f"{option} {','.join(order)}: no joint {joint!r}; there are {', '.join(joints)}")
-    if len(message.velocity) != len(joints):
-        raise InputError(f"a JointState has {len(message.velocity)} velocities for {len(joints)} joints; wheels are "
-                         "read from its velocities")  # fmt: skip
-    return Reading(stamp_of(message), tuple(float(message.velocity[joints.index(joint)]) for joint in order))
+    values = getattr(message, field)
+    if len(values) != len(joints):
+        other = "; with --wheel-ticks 6.283185 they are read from its positions [rad]" if field == "velocity" else ""
+        raise InputError(f"a JointState has {len(values)} numbers of {field} for {len(joints)} joints; wheels are read "
+                         f"from these{other}")  # fmt: skip
+    return Reading(stamp_of(message), tuple(float(values[joints.index(joint)]) for joint in order))
 
 
 def _only(side: str, joints: list[str], option: str) -> str:

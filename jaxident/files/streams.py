@@ -128,8 +128,8 @@ def merge(
     times have other units.
     """
     _check_settings(pose_offset, period=period, track=track, hold_timeout=hold_timeout)
-    command_t, value = _latest("commands", commands.t, wheel_speeds(commands.value, track))
-    pose_t, pose = _latest("poses", np.asarray(poses.t) + pose_offset, poses.pose)
+    command_t, value = latest("commands", commands.t, wheel_speeds(commands.value, track))
+    pose_t, pose = latest("poses", np.asarray(poses.t) + pose_offset, poses.pose)
     check_pose_rate("poses", np.diff(pose_t))
     _check_overlap(command_t, pose_t)
     end = max(command_t[-1], pose_t[-1])
@@ -150,7 +150,7 @@ def _laid(values: tuple, rows: np.ndarray) -> list[np.ndarray]:
 
 def _inside(wheels: WheelSpeeds, begin: float, end: float) -> tuple[np.ndarray, Wheels]:
     """Times and wheel speeds from the first command to the end; InputError where there are none."""
-    t, speed = _latest("wheel speeds", wheels.t, wheels.speed)
+    t, speed = latest("wheel speeds", wheels.t, wheels.speed)
     kept = (t >= begin - SAME_TIME) & (t <= end + SAME_TIME)
     if not kept.any():
         raise InputError(
@@ -191,7 +191,7 @@ def _check_settings(pose_offset: float, **positive: float | None) -> None:
             raise InputError(f"{name}: is {value:g}; it should be positive")
 
 
-def _latest(name: str, t: Any, value: Signal) -> tuple[np.ndarray, Signal]:
+def latest(name: str, t: Any, value: Signal) -> tuple[np.ndarray, Signal]:
     """A stream in order of time, each time once: of several entries at one time the last counts."""
     t = np.asarray(t, float)
     if not len(t):

@@ -59,9 +59,32 @@ def test_three_streams_become_a_log_and_a_late_one_is_mended(folder):
     assert float(ended.stdout.split("--wheels-offset ")[1].split()[0]) == pytest.approx(-0.2, abs=0.02)
 
 
+def test_counts_become_speeds(folder):
+    log = ji.read_log(folder / "log.csv")
+    frame = log.to_dataframe()
+    for name, columns in (("cmd", ["t", "u_r", "u_l"]), ("pose", ["t", "x", "y", "theta"])):
+        frame[columns].to_csv(folder / f"{name}.csv", index=False)
+    turned = {side: 1e4 / (2.0 * np.pi) * np.cumsum(0.05 * frame[side]) for side in ("wheel_r", "wheel_l")}
+    frame.assign(**{side: np.floor(each) % 4096 for side, each in turned.items()})[["t", *turned]].to_csv(
+        folder / "ticks.csv", index=False
+    )
+    words = ("convert", "--commands", "cmd.csv", "--poses", "pose.csv", "--wheels", "ticks.csv", "--out", "counted.csv")
+    ended = jaxident(*words, "--wheel-ticks", "10000", cwd=folder)
+    assert ended.returncode == 2
+    assert "`--wheel-counter 4096`" in ended.stderr.replace("\n", " ")
+    ended = jaxident(*words, "--wheel-ticks", "10000", "--wheel-counter", "4096", "--period", "0.05", cwd=folder)
+    assert ended.returncode == 0, ended.stderr
+    assert "one count more in 0.1 s is 0.00628 rad/s" in ended.stdout
+    made = ji.read_log(folder / "counted.csv")
+    wanted = 0.5 * (log.wheel_r[1:-1] + log.wheel_r[2:])  # each count holds the speed of the step before it
+    np.testing.assert_allclose(made.wheel_r[1:-1], wanted, atol=0.0064)
+
+
 @pytest.mark.parametrize(
     ("words", "line"),
     [
+        (("--commands", "cmd.csv", "--poses", "pose.csv", "--wheel-ticks", "10"), "which is missing"),
+        (("--commands", "cmd.csv", "--poses", "pose.csv", "--wheels", "wheel.csv", "--wheel-counter", "10"), "as well"),
         (("--wheels", "wheel.csv", "--bag", "x.mcap"), "--wheels CSV goes with --commands and --poses"),
         (("--wheels-topic", "/j", "--commands", "cmd.csv", "--poses", "pose.csv"), "are for --bag PATH"),
         (("--log", "log.csv", "--wheels", "wheel.csv"), "--wheels is for two streams"),

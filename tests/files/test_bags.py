@@ -150,11 +150,13 @@ def test_measured_wheel_speeds_are_a_third_topic(tmp_path):
         add_commands(bag, "TwistStamped")
         add_poses(bag, "PoseStamped")
         for stamp, v, w in zip(COMMAND_AT, V, W, strict=True):
-            message = bag.make("sensor_msgs/JointState", bag.header(stamp), ["fl", "fr"], np.zeros(2),
-                               np.array([w, v]), np.zeros(0))  # fmt: skip
+            message = bag.make("sensor_msgs/JointState", bag.header(stamp), ["fl", "fr"],
+                               np.array([2.0 * w, 3.0 * v]), np.array([w, v]), np.zeros(0))  # fmt: skip
             bag.add("/joint_states", stamp + LATE, message)
     found = read_bag_wheels(path, "/joint_states", Choice(wheel_joints=("fr", "fl")))
     np.testing.assert_array_equal(found.speed, [V, W])
+    counts = read_bag_wheels(path, "/joint_states", Choice(wheel_joints=("fr", "fl"), positions=True))
+    np.testing.assert_array_equal(counts.speed, [3.0 * np.array(V), 2.0 * np.array(W)])
     np.testing.assert_array_equal(found.t, [float(text) for text in seconds(COMMAND_AT)])
     log = quietly(path, "/cmd", "/pose", wheels_topic="/joint_states", wheel_joints=("fr", "fl"), track=0.3)
     np.testing.assert_array_equal(log.wheel_r[np.isfinite(log.wheel_r)], V)
