@@ -22,7 +22,8 @@ with atheris.instrument_imports(include=["jaxident.files", "jaxident.columns", "
     from jaxident.files.logs import read_log
     from jaxident.files.models import load_model, model_to_dict
     from jaxident.files.streams import read_commands, read_poses
-    from jaxident.files.studies import EXAMPLE, read_study
+    from jaxident.files.studies import read_study
+    from jaxident.files.study_example import EXAMPLE
     from jaxident.study.dataset import describe
 
 from jaxident.errors import InputError, WorkError

@@ -19,7 +19,7 @@ from experiments.rows import write_rows
 from jaxident.robot.model import DIFFERENCE_ORDER
 from jaxident.study.dataset import study_arrays
 from jaxident.study.design import Candidate, Study
-from jaxident.study.estimators import FOUND, Choice
+from jaxident.study.sight import FOUND, Choice
 
 ESTIMATORS = ("recursive", "key-term-least-squares", "instrumental-variables", "maximum-likelihood")
 NOISE = (2e-4, 5e-4, 1e-3, 2e-3, 5e-3)

@@ -26,7 +26,7 @@ def command(study, out, scheduler, trial, example, seed):
     Example: jaxident sweep --example > study.toml, then jaxident sweep study.toml --out study
     """
     if example:
-        from jaxident.files.studies import EXAMPLE
+        from jaxident.files.study_example import EXAMPLE
 
         click.echo(EXAMPLE, nl=False)
         return

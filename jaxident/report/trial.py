@@ -12,7 +12,7 @@ from jaxident.robot.model import DIFFERENCE_ORDER
 from jaxident.robot.path_length import path_length
 from jaxident.study.dataset import coordinates
 from jaxident.study.design import Study
-from jaxident.study.estimators import REASONS
+from jaxident.study.sight import REASONS
 from jaxident.study.trial import Outcome, Recording
 
 SHOWN_ROWS = 300

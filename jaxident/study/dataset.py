@@ -14,7 +14,8 @@ from jaxident.origin import versions as of_packages
 from jaxident.robot.model import DIFFERENCE_ORDER, Discovered, Effect
 from jaxident.study.design import PARTS, Study, check_study
 from jaxident.study.engine import chunks, run_locally
-from jaxident.study.estimators import REASONS, settings_of
+from jaxident.study.estimators import settings_of
+from jaxident.study.sight import REASONS
 from jaxident.study.trial import Outcome
 
 FURTHER_AXES = {

@@ -10,7 +10,8 @@ from jaxident.effects.discovered import check_discovered
 from jaxident.errors import InputError
 from jaxident.robot.excitation import EXCITATIONS
 from jaxident.robot.model import Effect, Model, require_physical
-from jaxident.study.estimators import Choice, check_choice
+from jaxident.study.estimators import check_choice
+from jaxident.study.sight import Choice
 
 AXES = ("excitation", "samples", "robot", "effect", "period", "amplitude", "noise", "seed")
 """The axes of a study's trials in their order, the last one fastest; `effect` where a study has `effects`, else not."""

@@ -6,7 +6,7 @@ compiled program.
 
 import functools
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -21,7 +21,7 @@ from jaxident.estimation.increments.initialise import Setup, initialise
 from jaxident.estimation.increments.input_forms import NAMES, reading_of, usable
 from jaxident.estimation.increments.instrumental import fit_instrumental
 from jaxident.estimation.increments.key_term_fit import Batch, fit_key_terms
-from jaxident.estimation.increments.observations import Observations, complete_observations, observe_log, tail
+from jaxident.estimation.increments.observations import complete_observations, observe_log, tail
 from jaxident.estimation.increments.projection import project
 from jaxident.estimation.poses.maximum_likelihood import fit_runs
 from jaxident.estimation.poses.parameters import Law, to_vector
@@ -31,72 +31,21 @@ from jaxident.log import Log
 from jaxident.robot.difference import to_difference
 from jaxident.robot.model import difference_vector
 from jaxident.robot.path_length import path_length
-
-REASONS = (
-    "found",
-    "the robot does not move",
-    "no start values",
-    "the estimate is not finite",
-    "the search did not arrive",
+from jaxident.study.sight import (
+    AT_REST,
+    FOUND,
+    NO_START,
+    NOT_ARRIVED,
+    NOT_FINITE,
+    Choice,
+    Finding,
+    Method,
+    Setting,
+    Sight,
 )
-"""How an estimate ended; its index is stored with every trial, 0 is success."""
-
-FOUND, AT_REST, NO_START, NOT_FINITE, NOT_ARRIVED = range(5)
 
 UNKNOWNS_OF_ONE_CHANNEL = 6
 """Numbers that one channel's residuals determine: its pole, four numerator coefficients, its share of two widths."""
-
-
-class Sight(NamedTuple):
-    """What an estimator sees of a trial: one even run without gaps, arrays (samples,), and what can be had from it.
-
-    observations leave out the first sample, whose command before is unknown. setup(rows, reading, d_max) gives the
-    start values from the first rows; estimators that ask for the same share the work. wheels: measured wheel speeds,
-    None of robots without.
-    """
-
-    log: Log
-    observations: Observations
-    setup: Callable[[int, str, Array], Setup]
-    largest: Array
-    wheels: Wheels | None = None
-
-
-class Finding(NamedTuple):
-    """Estimate and standard deviations (12,) in DIFFERENCE_ORDER (NaN: none is known), and an index of REASONS."""
-
-    estimate: Any
-    deviation: Any
-    reason: Any
-
-
-class Setting(NamedTuple):
-    """A setting of a method: its value where none is given, which values are right, and how to say so."""
-
-    default: Any
-    valid: Callable[[Any], bool]
-    right: str
-
-
-class Method(NamedTuple):
-    """run(sight, settings) -> Finding, and the settings it takes.
-
-    alone: no two of its programs may run at once in a process. Its eigenvalues come from LAPACK, whose batched call
-    hands its work to XLA's threads and waits for them, on one of these itself; with as many programs as threads, all
-    wait for ever.
-    """
-
-    run: Callable[[Sight, dict[str, Any]], Finding]
-    settings: dict[str, Setting]
-    alone: bool = False
-
-
-class Choice(NamedTuple):
-    """An estimator of a study: its name there, its method, and (key, value) pairs of settings that are not default."""
-
-    name: str
-    method: str
-    settings: tuple[tuple[str, Any], ...] = ()
 
 
 def settings_of(choice: Choice) -> dict[str, Any]:
@@ -237,9 +186,10 @@ _PAPER = {
 }
 _WHOLE = {"d_max_share": _PAPER["d_max_share"]}
 _POSES = {
-    "wheels": Setting(True, lambda value: isinstance(value, bool), "true, or false for the poses alone"),
-    "coupling": Setting(False, lambda value: isinstance(value, bool), "true for robots whose speeds change each other"),
-}
+    key: Setting(default, lambda value: isinstance(value, bool), right)
+    for key, default, right in (("wheels", True, "true, or false for the poses alone"),
+                                ("coupling", False, "true for robots whose speeds change each other"))
+}  # fmt: skip
 BEST = "maximum-likelihood"
 """The method whose errors come near the Cramér-Rao bound."""
 METHODS = {

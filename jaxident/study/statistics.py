@@ -19,7 +19,7 @@ import xarray
 from jaxident.array_types import Array
 from jaxident.study.design import AXES
 from jaxident.study.engine import pieces
-from jaxident.study.estimators import FOUND, REASONS
+from jaxident.study.sight import FOUND, REASONS
 
 LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)
 """Quantiles of the error."""

@@ -25,7 +25,8 @@ from jaxident.robot.model import Model, difference_vector
 from jaxident.robot.noise import Noise, draw_noise, observe
 from jaxident.robot.simulate import run_physical
 from jaxident.robot.wheel_sensor import measure_wheels
-from jaxident.study.estimators import Choice, estimate, see
+from jaxident.study.estimators import estimate, see
+from jaxident.study.sight import Choice
 
 
 class Robot(NamedTuple):
@@ -69,7 +70,7 @@ class Plan(NamedTuple):
 
 class Outcome(NamedTuple):
     """estimate and deviation (estimators, 12), truth (12,), all in DIFFERENCE_ORDER, and reason (estimators,): indices
-    of `estimators.REASONS`."""
+    of `sight.REASONS`."""
 
     estimate: Any
     deviation: Any

@@ -16,7 +16,7 @@ from support.program import jaxident
 from support.studies import SMALL, SMALL_TOML
 
 from jaxident.files.logs import read_log
-from jaxident.files.studies import EXAMPLE
+from jaxident.files.study_example import EXAMPLE
 from jaxident.study.dataset import study_arrays
 
 WORDS = [sys.executable, "-m", "jaxident", "sweep"]

@@ -9,7 +9,8 @@ from support.studies import SMALL, SMALL_TOML
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.errors import InputError
 from jaxident.files.models import save_model
-from jaxident.files.studies import EXAMPLE, parse_study, read_study
+from jaxident.files.studies import parse_study, read_study
+from jaxident.files.study_example import EXAMPLE
 from jaxident.study.dataset import describe
 
 ESTIMATORS = '[{ name = "key-term", method = "key-term-least-squares" }]'

@@ -9,7 +9,7 @@ from support.trials import invented
 
 from jaxident.files.summary import write_summary
 from jaxident.report.sweep import SINGLE, what_next, write_study
-from jaxident.study.estimators import Choice
+from jaxident.study.sight import Choice
 from jaxident.study.statistics import summarise
 
 

@@ -8,7 +8,8 @@ from support.studies import ROBOT, SMALL, UNDER_EFFECTS
 from jaxident.errors import InputError
 from jaxident.robot.model import Effect
 from jaxident.study.design import Candidate, EffectSet, check_study
-from jaxident.study.estimators import Choice, settings_of
+from jaxident.study.estimators import settings_of
+from jaxident.study.sight import Choice
 
 LAGGING = dataclasses.replace(ROBOT, effects=(Effect("motor_lag", {"time_constant": 0.05}),))
 

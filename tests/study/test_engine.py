@@ -11,7 +11,7 @@ from jaxident.robot.excitation import staircase
 from jaxident.study import engine, trial
 from jaxident.study.dataset import study_arrays
 from jaxident.study.engine import chunk_shape, chunks, pieces, run_chunk, run_one
-from jaxident.study.estimators import AT_REST, FOUND, NOT_FINITE, REASONS, Finding, Method
+from jaxident.study.sight import AT_REST, FOUND, NOT_FINITE, REASONS, Finding, Method
 from jaxident.study.statistics import summarise
 
 

@@ -8,7 +8,8 @@ from jaxident.robot.drive import Physical
 from jaxident.robot.model import Model
 from jaxident.study.dataset import study_arrays
 from jaxident.study.design import Candidate
-from jaxident.study.estimators import BEST, FOUND, METHODS, Choice
+from jaxident.study.estimators import BEST, METHODS
+from jaxident.study.sight import FOUND, Choice
 from jaxident.study.statistics import summarise
 
 DRIVE = Physical(np.array([0.541386, 7.817043]), np.array([[0.128988, 0.127287], [66.824208, -65.25288]]))

@@ -14,7 +14,7 @@ from jaxident.robot.wheel_sensor import WheelSensor
 from jaxident.study import bound, trial
 from jaxident.study.design import Candidate, check_study
 from jaxident.study.engine import cells, run_one
-from jaxident.study.estimators import Choice
+from jaxident.study.sight import Choice
 from jaxident.study.synthetic import excite
 
 SENSOR = WheelSensor(0.03, 0.1, 0.05)

@@ -18,7 +18,8 @@ from jaxident.errors import InputError
 from jaxident.files import atomic, table
 from jaxident.files.logs import read_log, write_log
 from jaxident.files.models import load_model, model_from_dict, model_to_dict, save_model
-from jaxident.files.studies import EXAMPLE, parse_study, read_study
+from jaxident.files.studies import parse_study, read_study
+from jaxident.files.study_example import EXAMPLE
 from jaxident.log import make_log
 from jaxident.robot.model import Provenance
 from jaxident.study.synthetic import excite, simulate_runs

@@ -8,7 +8,7 @@ from typing import Any
 from hypothesis import strategies as st
 
 from jaxident.files.models import load_model, model_to_dict
-from jaxident.files.studies import EXAMPLE
+from jaxident.files.study_example import EXAMPLE
 
 TOKENS = [
     b"", b"nan", b"inf", b"-inf", b"1e999", b"1e308", b"-1e308", b"1e-320", b"-0", b"0", b"1", b"9" * 400, b"1_000",

@@ -3,7 +3,7 @@
 from jaxident.files.models import load_model
 from jaxident.robot.model import Effect
 from jaxident.study.design import Candidate, EffectSet, Study
-from jaxident.study.estimators import Choice
+from jaxident.study.sight import Choice
 
 ROBOT = load_model("published")
 
