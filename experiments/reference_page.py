@@ -22,15 +22,15 @@ GROUPS = {
         "to_physical",
     ),
     "Simulate": ("simulate", "excite", "EXCITATIONS", "path_length"),
-    "Identify and predict": ("identify", "predict", "cramer_rao", "bootstrap"),
+    "Identify and predict": ("identify", "identify_motors", "predict", "cramer_rao", "bootstrap"),
     "Diagnose": ("diagnose", "plan"),
     "Many trials": ("Study", "read_study", "summarise"),
-    "Small types": ("Wheels", "Pose", "State", "Increment"),
+    "Small types": ("Wheels", "Pose", "State", "Increment", "WheelSensor"),
     "Errors": ("InputError", "WorkError"),
 }
 """Public names in the order of the page."""
 
-RESULTS = {"identify": "Identification", "predict": "Prediction", "diagnose": "Diagnosis"}
+RESULTS = {"identify": "Identification", "identify_motors": "Motors", "predict": "Prediction", "diagnose": "Diagnosis"}
 """What a function of `entry` returns, from `jaxident.results`."""
 
 ROOMS = {

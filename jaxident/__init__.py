@@ -36,6 +36,8 @@ _HOMES = {
     "identify": "jaxident.entry",
     "diagnose": "jaxident.entry",
     "bootstrap": "jaxident.entry",
+    "identify_motors": "jaxident.entry",
+    "WheelSensor": "jaxident.robot.wheel_sensor",
     "plan": "jaxident.diagnosis.planning.next_run",
     "cramer_rao": "jaxident.entry",
     "predict": "jaxident.entry",

@@ -33,6 +33,7 @@ from jaxident.diagnosis import diagnose as diagnosing
 from jaxident.effects import simulate as simulating
 from jaxident.estimation import bootstrap as resampling
 from jaxident.estimation import identify as identifying
+from jaxident.estimation import identify_motors as motors
 from jaxident.estimation import predict as predicting
 from jaxident.estimation.uncertainty import precision
 from jaxident.files.any_log import as_log, as_logs
@@ -62,6 +63,7 @@ def taking(
 
 
 identify = taking("identifying", identifying.identify, results.identified, logs=as_logs)
+identify_motors = taking("identifying", motors.identify_motors, results.motors, logs=as_logs)
 diagnose = taking("diagnosing", diagnosing.diagnose, results.diagnosed, logs=as_logs, sim=as_logs)
 bootstrap = taking("refitting", resampling.bootstrap, logs=as_logs)
 predict = taking("predicting", predicting.predict, results.predicted, log=as_log)

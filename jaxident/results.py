@@ -13,6 +13,7 @@ from jaxident import plot
 from jaxident.diagnosis import diagnose as diagnosing
 from jaxident.errors import InputError
 from jaxident.estimation import identify as identifying
+from jaxident.estimation import identify_motors
 from jaxident.estimation import predict as predicting
 from jaxident.estimation.uncertainty.verdict import Verdict, verdicts
 from jaxident.files.atomic import make_folder, write_text
@@ -25,6 +26,7 @@ from jaxident.report.account import account_lines, account_section, draw_account
 from jaxident.report.diagnosis import diagnosis_page
 from jaxident.report.identification import COLUMNS, draw_fit, with_words, write_identification
 from jaxident.report.lead import details, headline, lead
+from jaxident.report.motors import lines_of, rows_of, write_motors
 from jaxident.report.page import Figure, Table, fragment, write_page
 from jaxident.report.parameters import told
 from jaxident.report.words import error as size_of
@@ -87,6 +89,31 @@ def _counted(found: Identification) -> str:
     told = ", ".join(f"{words.count(word)} {word}" for word in dict.fromkeys(words))
     ending = "" if bool(found.ok) else "; the fit did not converge: do not trust these numbers"
     return f"identified from {poses} poses in {sum(len(log.runs()) for log in found.logs)} runs: {told}{ending}"
+
+
+class Motors(identify_motors.Motors):
+    """Motors with the logs that they were found in; fields as in `jaxident.estimation.identify_motors`."""
+
+    logs: list[Log]
+
+    def __repr__(self) -> str:
+        largest = max(float(np.max(np.abs(u))) for log in self.logs for u in log.command)
+        return "\n".join([*lines_of(self), *_aligned(rows_of(self, largest)), *identify_motors.against(self)])
+
+    def save(self, path: str | os.PathLike) -> None:
+        """Write the model to a file, whole or not at all."""
+        save_model(self.model, path)
+
+    def report(self, path: str | os.PathLike) -> None:
+        """Write the page of `jaxident motors --report`."""
+        write_motors(self, self.logs, path)
+
+
+def motors(found: identify_motors.Motors, logs: Sequence[Log]) -> Motors:
+    """What `identify_motors` found in some logs, as a result."""
+    result = Motors(*found)
+    result.logs = list(logs)
+    return result
 
 
 class Diagnosis(diagnosing.Diagnosis):

@@ -18,6 +18,7 @@ COMMANDS = {
     "effects": "Print the catalogue of what real robots do beyond the model.",
     "convert": "Make one log of commands and poses, or mend a log.",
     "identify": "Find the model behind one or several logs.",
+    "motors": "Find the model of the motors by wheel speeds alone.",
     "predict": "Predict the poses of a log by a model.",
     "diagnose": "Find the sim-to-real gap, which effects cause it, and how far it shrinks.",
     "rerun": "Make a result again from what it says of itself, and compare.",

@@ -22,6 +22,7 @@ from jaxident.errors import InputError, WorkError
 
 REPEATABLE = {
     "identify": ("--out", "--json"),
+    "motors": ("--out", "--json"),
     "predict": ("--out", "--json"),
     "plan": ("--out", "--json"),
     "simulate": ("--out",),

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from jaxident.array_types import Pose
 from jaxident.columns import WHEELS, Columns, check_both_wheels, make_columns
 from jaxident.errors import InputError
 from jaxident.files.atomic import writing_text
@@ -64,17 +65,19 @@ def read_whole(path: Source | Sequence[Source], columns: Columns | None = None) 
     return join(logs)
 
 
-def read_file(path: Source, columns: Columns | None = None) -> Log:
-    """The log of one file; see `read_log`."""
-    table = read_table(path, [COLUMNS], optional=("run", *WHEELS), columns=columns)
+def read_file(path: Source, columns: Columns | None = None, poses: bool = True) -> Log:
+    """The log of one file; see `read_log`. Without `poses` their columns may be missing."""
+    needed = COLUMNS if poses else tuple(name for name in COLUMNS if name not in Pose._fields)
+    table = read_table(path, [needed], optional=("run", *WHEELS, *(() if poses else Pose._fields)), columns=columns)
     check_both_wheels(table.name, table.columns)
-    filled = {"run": np.zeros(len(table.line))} | table.columns
-    return checked(Log(**filled), table.name, table.place)
+    none = {name: np.full(len(table.line), np.nan) for name in Pose._fields}
+    return checked(Log(**({"run": np.zeros(len(table.line))} | none | table.columns)), table.name, table.place)
 
 
-def read_logs(paths: Source | Sequence[Source], columns: Columns | None = None) -> list[Log]:
-    """The logs of files and folders, in the order of `find_logs`; each may hold several runs."""
-    return [read_file(path, columns) for path in find_logs(paths)]
+def read_logs(paths: Source | Sequence[Source], columns: Columns | None = None, poses: bool = True) -> list[Log]:
+    """The logs of files and folders, in the order of `find_logs`; each may hold several runs. Without `poses` their
+    columns may be missing."""
+    return [read_file(path, columns, poses) for path in find_logs(paths)]
 
 
 def find_logs(paths: Source | Sequence[Source], prefix: str = "real_") -> list[str]:

@@ -11,20 +11,21 @@ SPEEDS = (("speed", "m/s"), ("turn rate", "rad/s"))
 
 
 def wheel_speeds(
-    ground: tuple[Any, Any], rims: tuple[Any, Any], command: tuple[Any, Any], *,
+    ground: tuple[Any, Any] | None, rims: tuple[Any, Any], command: tuple[Any, Any], *,
     modelled: Mapping[str, tuple[Any, Any]] | None = None, axes: Any = None,
 ) -> Any:  # fmt: skip
     """One stretch of a log in three strips: speed [m/s], turn rate [rad/s] and commands [unit] against time [s].
 
     ground, rims, command, and each model: times (n,) and two rows of values (2, n), which are speed and turn rate by
-    the poses, by measured wheel speeds and of the model, and the right and left command. NaN where nothing is known.
-    Returns the three axes.
+    the poses, by measured wheel speeds and of the model, and the right and left command. NaN where nothing is known;
+    without poses `ground` is None. Returns the three axes.
     """
     axes = style.new_axes(3, 1, (style.WIDTH, 5.0)) if axes is None else axes
     dots: Any = {"color": style.MEASURED, "linestyle": "none", "marker": ".", "markersize": 4.0}
     raster = style.heavy(rims[0])
     for k, (ax, (name, unit)) in enumerate(zip(axes, SPEEDS, strict=False)):
-        ax.plot(ground[0], ground[1][k], label="robot (poses)", rasterized=raster, **dots)
+        if ground is not None:
+            ax.plot(ground[0], ground[1][k], label="robot (poses)", rasterized=raster, **dots)
         ax.plot(rims[0], rims[1][k], color=style.BLACK, linewidth=style.LINE, label="wheels", rasterized=raster)
         for order, (model, (times, speeds)) in enumerate((modelled or {}).items()):
             colour, _ = style.look_of(model, order)

@@ -108,3 +108,27 @@ def test_the_wheels_of_a_model_file_are_checked(folder):
             ji.load_model(folder / "bad.json")
     (folder / "good.json").write_text(json.dumps(content | {"wheels": {"radius": 0.1, "track": 0.3, "noise": None}}))
     assert ji.load_model(folder / "good.json").wheels == WheelSensor(0.1, 0.3, 0.0)
+
+
+def test_motors_are_found_on_blocks_without_a_camera(folder):
+    """Steady speeds per command are 1/6 m/s and 1 rad/s, rates 3 and 5 per second."""
+    log = ji.read_log(folder / "log.csv")
+    frame = log.to_dataframe()[["t", "u_r", "u_l", "wheel_r", "wheel_l"]]
+    frame.to_csv(folder / "blocks.csv", index=False)
+    words = "motors blocks.csv --wheel-radius 0.08 --wheel-track 0.333333 --out motors.json --report motors.html"
+    ended = jaxident(*words.split(), "--json", "motors_result.json", cwd=folder)
+    assert ended.returncode == 0, ended.stderr
+    assert "rate_1" in ended.stdout
+    assert "The wheels answer a command at once" in ended.stdout
+    found = ji.load_model(folder / "motors.json")
+    np.testing.assert_allclose(found.dynamics.rate, [3.0, 5.0], rtol=0.1)
+    np.testing.assert_allclose(found.dynamics.gain, [[0.5, 0.5], [5.0, -5.0]], rtol=0.1)
+    result = json.loads((folder / "motors_result.json").read_text())
+    assert min(result["explained"]) > 0.99
+    page = (folder / "motors.html").read_text()
+    assert "The motors" in page
+    assert "Commands and wheel speeds, measured and modelled" in page
+    ended = jaxident("predict", "motors.json", "log.csv", "--horizon", "20", "--out", "ahead.csv", cwd=folder)
+    assert ended.returncode == 0, ended.stderr
+    ended = jaxident(*words.replace("blocks.csv", "plain.csv").split(), cwd=folder)
+    assert (ended.returncode, "no wheel speeds" in ended.stderr) == (2, True)

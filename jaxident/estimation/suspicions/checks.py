@@ -51,7 +51,7 @@ def _in_degrees(log: Log) -> bool:
 def _in_the_air(log: Log) -> str:
     """What wheels tell that turn while nothing moves."""
     answer = answer_of_wheels(log)
-    return "; its wheels turn: are they in the air? A log on the ground shows how the robot moves" + (
+    return "; its wheels turn: are they in the air? `jaxident motors` finds what they show, the motors" + (
         "" if answer is None else f" ({told(answer)})"
     )
 

@@ -124,7 +124,7 @@ def _lagged(t: np.ndarray, u: np.ndarray, rate: float) -> np.ndarray:
     return np.concatenate([np.zeros((1, u.shape[1])), found])
 
 
-def _follow(t: np.ndarray, u: np.ndarray, rate: float, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def follow_commands(t: np.ndarray, u: np.ndarray, rate: float, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """F and f (len(at), columns) at any times; before the first command nothing was commanded."""
     start = _lagged(t, u, rate)
     area = np.concatenate([np.zeros((1, u.shape[1])), np.cumsum(np.diff(t)[:, None] * u[:-1], axis=0)])
@@ -143,7 +143,7 @@ def _search(streams: Streams, rate: float, limit: float) -> tuple[np.ndarray, np
     knots = np.concatenate([ends[:1, 0], ends[:, 1]])
     total = np.concatenate([np.zeros((1, 2)), np.cumsum(streams.increment, axis=0)])
     measured = np.stack([np.diff(np.interp(edges, knots, column)) for column in total.T])
-    inputs = np.diff(_follow(t, streams.command, rate, np.arange(t[0], t[-1] + step, step))[0], axis=0).T
+    inputs = np.diff(follow_commands(t, streams.command, rate, np.arange(t[0], t[-1] + step, step))[0], axis=0).T
     measured, inputs = (part - part.mean(axis=1, keepdims=True) for part in (measured, inputs))
     size = 1 << int(np.ceil(np.log2(measured.shape[1] + inputs.shape[1] + 1)))
     seen, sent = np.fft.rfft(measured, size), np.fft.rfft(inputs, size)
@@ -178,7 +178,7 @@ def _tabulate(streams: Streams, offset: float, rates: np.ndarray) -> _Table:
     length = np.diff(at, axis=1)
 
     def moved(rate: float) -> tuple[np.ndarray, np.ndarray]:
-        first, last = (_follow(streams.command_t, u, rate, side) for side in at.T)
+        first, last = (follow_commands(streams.command_t, u, rate, side) for side in at.T)
         return last[0] - first[0], last[1] - first[1]
 
     columns, by_offset, by_rate = [], [], []

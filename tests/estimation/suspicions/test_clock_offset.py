@@ -5,7 +5,7 @@ import pytest
 
 from jaxident.array_types import Pose, Wheels
 from jaxident.errors import InputError
-from jaxident.estimation.suspicions.clock_offset import _follow, respond, streams_of, streams_of_log
+from jaxident.estimation.suspicions.clock_offset import follow_commands, respond, streams_of, streams_of_log
 from jaxident.files.offset import estimate_offset
 from jaxident.files.streams import Commands, Poses
 from jaxident.log import Log, join
@@ -112,7 +112,7 @@ def test_the_lag_is_exact():
     """Against steps so fine that a sum is an integral; doubling spans equals the recursion."""
     t, u = np.array([0.0, 0.3, 0.35, 1.0]), np.array([[1.0], [-1.0], [0.5], [0.0]])
     at = np.array([0.1, 0.3, 0.9, 1.7])
-    area, speed = _follow(t, u, 4.0, at)
+    area, speed = follow_commands(t, u, 4.0, at)
     fine = np.arange(0.0, 2.0, 1e-5)
     f = np.zeros(len(fine))
     for k in range(len(fine) - 1):
