@@ -22,7 +22,7 @@ from jaxident.effects.stages import CHAIN, STAGES
 from jaxident.robot.drive import Physical
 
 PACKAGE = pathlib.Path(__file__).resolve().parents[2] / "jaxident"
-EXAMPLES = {"cli/session.py", "diagnosis/planning/question.py", "files/studies.py"}
+EXAMPLES = {"cli/session.py", "diagnosis/planning/question.py", "files/study_example.py"}
 """Files with a message or a template for users that shows an effect as an example, within a longer text."""
 WORDS = {"backlash", "outliers", "slope", "stiction"}
 """Names that are words of English or of another trade as well: the slope of a curve, outliers of a fit."""

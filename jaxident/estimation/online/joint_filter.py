@@ -1,7 +1,8 @@
 """State and parameters in one extended Kalman filter on poses: a recursive estimator that stands camera noise.
 
 States x, y, theta, v, w, the camera's errors where they have a memory, then log rates, gains and dead zones (Jazwinski
-1970, section 8.4). `step` is pure and jittable: the same function runs inside a scan, under `vmap`, and once per camera
+1970, section 8.4); before these the logarithms of radius and track of a robot that measures its wheels, whose speeds
+then count as well. `step` is pure and jittable: the same function runs inside a scan, under `vmap`, and once per camera
 frame on a robot.
 
 Examples:
@@ -24,20 +25,21 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxident.array_types import Array, Pose, PoseVector, RobotMatrix, RobotVector
+from jaxident.array_types import Array, Pose, PoseVector, RobotMatrix, RobotVector, Wheels
 from jaxident.array_types import State as Motion
 from jaxident.errors import InputError
 from jaxident.estimation.online.joint_start import begin_from_model, begin_from_run, unsure
-from jaxident.estimation.online.joint_step import PARAMETERS, Drift, advance_belief
+from jaxident.estimation.online.joint_step import PARAMETERS, SENSOR_AT, Drift, advance_belief, take_in_wheels
 from jaxident.estimation.poses.filter import Belief, take_in
 from jaxident.estimation.poses.noise_law import NOISE_LAWS
 from jaxident.estimation.poses.parameters import NAMES
-from jaxident.estimation.poses.runs import Runs, stack_runs
+from jaxident.estimation.poses.runs import Runs, stack_runs, with_wheels
 from jaxident.log import Log, require_log
 from jaxident.numerics import require_float64
 from jaxident.robot.drive import Physical
 from jaxident.robot.model import Model, require_physical
 from jaxident.robot.noise import Noise
+from jaxident.robot.wheel_sensor import WheelSensor
 
 LIMIT, GATE = 10.0, 30.0
 """Standard deviations by which a pose may differ from what was expected: beyond LIMIT it counts no more than there,
@@ -50,7 +52,8 @@ LOG_RATE = (-9.0, 7.0)
 
 
 class Sample(NamedTuple):
-    """One row of a log: its time [s], the command from now on, the pose now (NaN: not seen)."""
+    """One row of a log: its time [s], the command from now on, the pose now (NaN: not seen), and the measured wheel
+    speeds [rad/s] (NaN: not measured), None for a robot without."""
 
     t: Any
     u_r: Any
@@ -58,11 +61,14 @@ class Sample(NamedTuple):
     x: Any
     y: Any
     theta: Any
+    wheel_r: Any = None
+    wheel_l: Any = None
 
 
 class State(NamedTuple):
     """What the next step needs: the belief, noise law and known coupling (2,) or None, how parameters drift, largest
-    dead zone, command (2,) and time [s] of the last row, poses in a row beyond the gate, whether the start was sound.
+    dead zone, command (2,) and time [s] of the last row, poses in a row beyond the gate, whether the start was sound;
+    wheel_noise [rad/s], None without wheel speeds; radius and track are in the belief then.
     """
 
     belief: Belief
@@ -74,6 +80,7 @@ class State(NamedTuple):
     t: Any
     strikes: Any
     sound: Any
+    wheel_noise: Any = None
 
 
 class Info(NamedTuple):
@@ -92,8 +99,9 @@ def init(log: Log, *, d_max: Array, memory: Array = jnp.inf, noise_law: str = "w
 
     d_max: largest dead zone [unit of the command]. memory [s]: how long the parameters remember; infinite for a robot
     that does not change. A change is followed after about one memory of rich input. A log that leaves a parameter open,
-    such as one with a single level above a dead zone, gives a state that is never `ok`. InputError for an unknown law
-    or several runs. Needs double precision.
+    such as one with a single level above a dead zone, gives a state that is never `ok`. Of a log with wheel speeds
+    radius and track are found, too, and stay as they are. InputError for an unknown law or several runs. Needs double
+    precision.
     """
     require_float64("joint_filter.init")
     require_log(log, "joint_filter.init")
@@ -101,7 +109,8 @@ def init(log: Log, *, d_max: Array, memory: Array = jnp.inf, noise_law: str = "w
         raise InputError(f"noise law {noise_law!r}: choose from {', '.join(NOISE_LAWS)}")
     if len(log.runs()) != 1:
         raise InputError(f"the setup log holds {len(log.runs())} runs: the recursion begins at the end of one")
-    runs = stack_runs(Log(*(np.asarray(column) for column in log)))
+    log = Log(*(np.asarray(column) for column in log))
+    runs = stack_runs(log) if log.wheel_r is None else with_wheels(stack_runs(log), log)
     run = jax.tree.map(lambda leaf: leaf if np.ndim(leaf) == 0 else leaf[0], runs)
     state = start(run, jnp.asarray(d_max, float), memory, noise_law)
     return state._replace(t=jnp.asarray(log.t[-1], float))
@@ -109,18 +118,20 @@ def init(log: Log, *, d_max: Array, memory: Array = jnp.inf, noise_law: str = "w
 
 def init_from_model(model: Model, t: Array, *, d_max: Array, memory: Array = jnp.inf) -> State:
     """State before the first row, at a time t [s] that lies before it: parameters and their covariance from a model,
-    the pose from the first one seen. InputError for a model without physical parameters, covariance or noise."""
+    the pose from the first one seen; wheel speeds count where the model has `wheels` with noise. InputError for a model
+    without physical parameters, covariance or noise."""
     require_float64("joint_filter.init_from_model")
-    belief, noise, widest = begin_from_model(model, d_max)
+    belief, noise, widest, wheel_noise = begin_from_model(model, d_max)
     coupling = require_physical(model).coupling
-    return _state(belief, noise, coupling, widest, d_max, memory, jnp.zeros(2), t, LOST_AFTER, True)
+    return _state(belief, noise, coupling, widest, d_max, memory, jnp.zeros(2), t, LOST_AFTER, True, wheel_noise)
 
 
 def start(run: Runs, d_max: Array, memory: Array, noise_law: str) -> State:
     """State after a setup run (rows,), its last row at time 0; pure, maps over trials."""
-    belief, noise, widest, ok = begin_from_run(run, d_max, NOISE_LAWS[noise_law])
+    law = NOISE_LAWS[noise_law]._replace(wheels=run.wheels is not None)
+    belief, noise, widest, ok, wheel_noise = begin_from_run(run, d_max, law)
     command = jnp.stack([column[-1] for column in run.command])
-    return _state(belief, noise, None, widest, d_max, memory, command, 0.0, 0, ok)
+    return _state(belief, noise, None, widest, d_max, memory, command, 0.0, 0, ok, wheel_noise)
 
 
 def step(state: State, sample: Sample) -> tuple[State, Info]:
@@ -140,7 +151,11 @@ def step(state: State, sample: Sample) -> tuple[State, Info]:
     expected = _choose(lost, _search_at(expected, pose, state.noise), expected)
     corrected, (error, _) = take_in(expected, pose, seen, state.noise, LIMIT)
     used = seen & jnp.all(jnp.abs(error) < GATE)
-    belief = _bounded(_choose(used, corrected, expected), state.d_max)
+    belief = _choose(used, corrected, expected)
+    if state.wheel_noise is not None and sample.wheel_r is not None:
+        speeds = Wheels(sample.wheel_r, sample.wheel_l)
+        belief = take_in_wheels(belief, state.wheel_noise, state.noise, speeds, held, later, LIMIT)
+    belief = _bounded(belief, state.d_max)
     good = later & jnp.all(jnp.isfinite(belief.mean)) & jnp.all(jnp.isfinite(belief.covariance))
     command = jnp.stack([jnp.asarray(sample.u_r, float), jnp.asarray(sample.u_l, float)])
     after = state._replace(
@@ -167,16 +182,26 @@ def to_model(state: State, sample_period: float) -> Model:
     values, covariance = estimate(state)
     drive = Physical(values[:2], values[2:6].reshape(2, 2), state.coupling)
     order = NAMES[:PARAMETERS]
-    return Model(sample_period, drive, values[6:], state.noise, covariance=covariance, parameter_order=order)
+    return Model(sample_period, drive, values[6:], state.noise, covariance=covariance, parameter_order=order,
+                 wheels=sensor_of(state))  # fmt: skip
 
 
-def _state(belief, noise, coupling, widest, d_max, memory, command, t, strikes, sound) -> State:
+def sensor_of(state: State) -> WheelSensor | None:
+    """The sensor of wheel speeds as it is known now, None without."""
+    if state.wheel_noise is None:
+        return None
+    radius, track = jnp.exp(state.belief.mean[SENSOR_AT])
+    return WheelSensor(radius, track, state.wheel_noise)
+
+
+def _state(belief, noise, coupling, widest, d_max, memory, command, t, strikes, sound, wheel_noise) -> State:
     """A state whose leaves have the types that `step` gives back."""
-    noise, coupling, memory, d_max, t = jax.tree.map(
-        lambda value: jnp.asarray(value, float), (noise, coupling, memory, d_max, t)
+    noise, coupling, memory, d_max, t, wheel_noise = jax.tree.map(
+        lambda value: jnp.asarray(value, float), (noise, coupling, memory, d_max, t, wheel_noise)
     )
     sound = jnp.asarray(sound) & jnp.all(jnp.isfinite(belief.covariance))
-    return State(belief, noise, coupling, Drift(memory, widest), d_max, command, t, jnp.asarray(strikes, int), sound)
+    strikes = jnp.asarray(strikes, int)
+    return State(belief, noise, coupling, Drift(memory, widest), d_max, command, t, strikes, sound, wheel_noise)
 
 
 def _search_at(belief: Belief, pose: PoseVector, noise: Noise) -> Belief:

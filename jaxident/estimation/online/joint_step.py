@@ -6,13 +6,15 @@ import jax
 import jax.numpy as jnp
 from jax.scipy.stats import norm
 
-from jaxident.array_types import Array, PerWheel
+from jaxident.array_types import Array, PerWheel, Wheels
 from jaxident.estimation.poses.filter import Belief, advance_with_slopes, step_weights
 from jaxident.robot.drive import Physical, hold
 from jaxident.robot.noise import Noise
 
 PARAMETERS = 8
 """The belief ends with two log rates, four gains and two dead zones, as `parameters.to_vector` orders them."""
+SENSOR_AT = slice(-PARAMETERS - 2, -PARAMETERS)
+"""Where the logarithms of radius and track stand in a belief with wheel speeds."""
 SMALLEST_WIDTH = 1e-9
 
 
@@ -72,6 +74,36 @@ def expected_output(command: PerWheel, width: PerWheel, deviation: PerWheel) -> 
     share = norm.cdf(clear)
     side = jnp.sign(command)
     return side * deviation * (clear * share + norm.pdf(clear)), -side * share
+
+
+def take_in_wheels(
+    belief: Belief, wheel_noise: Array, noise: Noise, speeds: Wheels, held: Array, later: Array, limit: float
+) -> Belief:
+    """The belief after both wheel speeds of a row `held` [s] after the last, each alone where the other is missing
+    (NaN); `later`: whether it counts. Beyond `limit` deviations an innovation counts no more than one of that size.
+
+    Random slip comes after the wheel: it moves the robot's speeds away from the drive's, which the wheels show, by
+    density^2 / (2 rate) in the long run, and for a time of 1 / rate. That counts as noise of the wheels, as large as
+    makes so many rows say as much as one: density^2 / (rate^2 held).
+    """
+    mean, covariance = belief
+    rates = jnp.exp(mean[-PARAMETERS : 2 - PARAMETERS])
+    slips = jnp.stack([noise.slip_along, noise.slip_heading]) ** 2 / (2.0 * rates)
+    slips = slips * jnp.maximum(2.0 / (rates * held), 1.0)
+    for side, speed in ((1.0, speeds.right), (-1.0, speeds.left)):
+        radius, track = jnp.exp(mean[SENSOR_AT])
+        across = side * 0.5 * track / radius
+        expected = mean[3] / radius + across * mean[4]
+        weights = jnp.stack([1.0 / radius, across])
+        row = jnp.zeros_like(mean).at[3:5].set(weights).at[SENSOR_AT].set(jnp.stack([-expected, across * mean[4]]))
+        seen = jnp.isfinite(speed) & later
+        shared = covariance @ row
+        variance = row @ shared + wheel_noise**2 + jnp.sum(weights**2 * slips)
+        size = jnp.sqrt(variance)
+        error = jnp.clip(jnp.where(seen, speed, 0.0) - expected, -limit * size, limit * size)
+        gain = jnp.where(seen, shared / variance, 0.0)
+        mean, covariance = mean + gain * error, covariance - gain[:, None] * shared
+    return Belief(mean, covariance)
 
 
 def _forget(covariance: Array, step: Array, drift: Drift) -> Array:

@@ -1,5 +1,6 @@
 """The joint filter: the plain filter where parameters are known, the bound where they are not, change, and corners."""
 
+import dataclasses
 from functools import partial
 
 import jax
@@ -7,10 +8,12 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+import jaxident as ji
 from jaxident.array_types import AT_REST, State, Wheels
 from jaxident.errors import InputError
 from jaxident.estimation.online import joint_filter
 from jaxident.estimation.online.joint_filter import (
+    LIMIT,
     LOST_AFTER,
     Sample,
     estimate,
@@ -20,7 +23,7 @@ from jaxident.estimation.online.joint_filter import (
     step,
     to_model,
 )
-from jaxident.estimation.online.joint_step import expected_output
+from jaxident.estimation.online.joint_step import expected_output, take_in_wheels
 from jaxident.estimation.poses.filter import first_belief, scan_filter
 from jaxident.estimation.poses.parameters import NAMES, Law, Robot, to_vector
 from jaxident.estimation.poses.runs import Runs
@@ -32,6 +35,7 @@ from jaxident.robot.excitation import EXCITATIONS
 from jaxident.robot.model import Model
 from jaxident.robot.noise import Noise, draw_noise, observe
 from jaxident.robot.simulate import run_forces, simulate
+from jaxident.robot.wheel_sensor import WheelSensor
 
 PERIOD, ROWS, D_MAX = 1.0 / 30.0, 1000, 0.9
 TRUTH = np.array([0.541386, 7.817043, 0.128988, 0.127287, 66.824208, -65.25288, 0.25, 0.2])
@@ -297,3 +301,95 @@ def test_what_cannot_begin_says_why():
     model = Model(PERIOD, drive_of(TRUTH), TRUTH[6:], NOISE)
     with pytest.raises(InputError, match="covariance"):
         joint_filter.init_from_model(model, 0.0, d_max=0.9)
+
+
+SENSOR = WheelSensor(0.03, 0.1, 0.1)
+
+
+def measuring(noise=NOISE, share=0.02):
+    """A robot that measures its wheels and the same as a model that knows it to a relative `share`."""
+    drive = Physical(TRUTH[:2], TRUTH[2:6].reshape(2, 2))
+    robot = Model(PERIOD, drive, TRUTH[6:], noise, wheels=SENSOR)
+    names, values = (*NAMES[:8], "wheel_radius", "wheel_track"), np.array([*TRUTH, SENSOR.radius, SENSOR.track])
+    return robot, dataclasses.replace(robot, covariance=np.diag((share * values) ** 2), parameter_order=names)
+
+
+def rows_of(log, wheels=True):
+    more = (log.wheel_r, log.wheel_l) if wheels else ()
+    return Sample(jnp.asarray(log.t), *map(jnp.asarray, (log.u_r, log.u_l, *log.pose, *more)))
+
+
+@jax.jit
+def through(state, rows):
+    return jax.lax.scan(step, state, rows)
+
+
+def driven(robot, seed, rows=600):
+    log = ji.simulate(robot, ji.excite(jax.random.key(seed), "multilevel", rows, PERIOD), key=jax.random.key(seed + 99))
+    return type(log)(*map(np.asarray, log))
+
+
+def test_wheel_speeds_make_the_parameters_surer_and_not_worse():
+    robot, model = measuring(Noise(3e-3, 3e-2))
+    log, begin = driven(robot, 0), init_from_model(model, -PERIOD, d_max=D_MAX)
+    both, info = through(begin, rows_of(log))
+    poses, _ = through(begin, rows_of(log, wheels=False))
+    assert bool(info.ok[-1])
+    ours, theirs = (np.sqrt(np.diagonal(estimate(state)[1])) for state in (both, poses))
+    assert np.all(ours < 1.01 * theirs)
+    assert np.median(ours / theirs) < 0.9
+    assert np.all(np.abs(np.asarray(estimate(both)[0]) - TRUTH) < 4.0 * ours)
+    sensor = to_model(both, PERIOD).wheels
+    np.testing.assert_allclose(sensor, SENSOR, rtol=2e-2)
+
+
+def test_a_missing_wheel_speed_leaves_the_other():
+    robot, model = measuring()
+    log = driven(robot, 1, 200)
+    blind = log._replace(wheel_r=np.full(200, np.nan), wheel_l=np.full(200, np.nan))
+    half = log._replace(wheel_r=np.full(200, np.nan))
+    begin = init_from_model(model, -PERIOD, d_max=D_MAX)
+    variances = [np.diagonal(through(begin, rows_of(each))[0].belief.covariance)[4] for each in (log, half, blind)]
+    assert variances[0] < variances[1] < variances[2]
+    plain = through(begin, rows_of(log, wheels=False))[0]
+    np.testing.assert_allclose(through(begin, rows_of(blind))[0].belief.mean, plain.belief.mean, rtol=1e-9, atol=1e-12)
+
+
+def test_a_wheel_speed_is_taken_in_as_a_plain_filter_takes_it():
+    """One row against the formulas with matrices, the derivative by differences."""
+    _, model = measuring()
+    state = init_from_model(model, -PERIOD, d_max=D_MAX)
+    state = state._replace(belief=state.belief._replace(mean=state.belief.mean.at[3:5].set(jnp.array([0.2, 1.5]))))
+    speeds = Wheels(9.0, jnp.nan)
+    found = take_in_wheels(state.belief, state.wheel_noise, state.noise, speeds, PERIOD, True, LIMIT)
+    mean, covariance = np.asarray(state.belief.mean), np.asarray(state.belief.covariance)
+
+    def speed(mean):
+        radius, track = np.exp(mean[-10:-8])
+        return (mean[3] + 0.5 * mean[4] * track) / radius
+
+    h = np.array([(speed(mean + e) - speed(mean - e)) / 2e-6 for e in 1e-6 * np.eye(len(mean))])
+    gain = covariance @ h / (h @ covariance @ h + SENSOR.noise**2)
+    np.testing.assert_allclose(found.mean, mean + gain * (9.0 - speed(mean)), rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(found.covariance, covariance - np.outer(gain, h @ covariance), rtol=1e-5, atol=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("slip", [0.0, 0.01])
+def test_errors_with_wheel_speeds_are_as_large_as_they_are_said_to_be(slip):
+    """Forty robots tell a deviation to 11 %, eight numbers together to less; a setup of ten seconds."""
+    values = np.array([3.0, 5.0, 0.6, 0.55, 9.0, -8.5, 0.25, 0.2])
+    noise = Noise(2e-3, 2e-2, slip_along=slip, slip_heading=10.0 * slip)
+    robot = Model(PERIOD, Physical(values[:2], values[2:6].reshape(2, 2)), values[6:], noise, wheels=SENSOR)
+    away: dict[bool, list] = {True: [], False: []}
+    for seed in range(40):
+        log = driven(robot, seed, 900)
+        for wheels, errors in away.items():
+            own = log if wheels else log._replace(wheel_r=None, wheel_l=None)
+            begin = init(own[:300], d_max=D_MAX, noise_law="slip" if slip else "white")
+            state, _ = through(begin, rows_of(own[300:], wheels))
+            found, covariance = estimate(state)
+            errors.append([found - values, (found - values) / np.sqrt(np.diagonal(covariance))])
+    both, poses = (np.sqrt(np.mean(np.array(each) ** 2, axis=0)) for each in away.values())
+    assert np.median(both[0] / poses[0]) < 0.9
+    assert np.sqrt(np.mean(both[1] ** 2)) < 1.25
