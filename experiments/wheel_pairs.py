@@ -27,6 +27,7 @@ CASES = {
     "command_polling": {"period": 0.03, "phase": 0.4},
     "coulomb_friction": {"right": 0.02, "left": 0.02}, "quadratic_drag": {"along": 0.1, "heading": 0.03},
     "lateral_slip": {"slip": 0.01}, "marker_offset": {"ahead": 0.002},
+    "asymmetric_dead_zone": {"right": 0.01, "left": 0.01}, "turn_loss": {"loss": 0.02},
 }  # fmt: skip
 """One effect of each pair after the other, so small that poses alone often leave rivals."""
 SENSOR = WheelSensor(0.03, 0.1, 0.1)
