@@ -12,13 +12,13 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.motion.paths import move, push_of, residuals
+from jaxident.diagnosis.motion.driving import pushes_of
+from jaxident.diagnosis.motion.paths import move, residuals
 from jaxident.diagnosis.motion.responses import answer_to_start
 from jaxident.diagnosis.motion.rims import rim_speeds
 from jaxident.diagnosis.motion.windows import Windows
-from jaxident.effects.coordinates import BY_DRIVE, NOMINAL, PLACES, limits, sizes
+from jaxident.effects.coordinates import limits, sizes
 from jaxident.effects.discovered import Laws
-from jaxident.effects.fast_input import PUSHING
 from jaxident.parallel import in_parallel
 
 START_STATES = 5
@@ -47,25 +47,17 @@ class Gram(NamedTuple):
     solve: Any
 
 
-_pushed, _moved, _tracked = jax.jit(push_of), jax.jit(residuals), jax.jit(move)
-_BY_DRIVE = [PLACES[pair] for pair in sorted(BY_DRIVE)]
-_PUSHING = [6, 7, *(place for (name, _), place in PLACES.items() if name in PUSHING)]
+_moved, _tracked = jax.jit(residuals), jax.jit(move)
 
 
 def follow(vectors: Array, starts: Array, windows: Windows, laws: Laws | None = None) -> np.ndarray:
     """Residuals (batch, windows, numbers) at vectors (batch, SIZE) and starts (batch, 5, windows).
 
-    One program takes one vector, and every core runs a program: a program of more vectors runs no faster. Vectors that
-    drive the wheels alike, as most columns of a linearisation do, share what costs most. Wheels that coast in their
-    play are driven alike by equal drives only.
+    One program takes one vector, and every core runs a program: a program of more vectors runs no faster.
     """
     windows = jax.tree.map(jnp.asarray, windows)
-    driven = vectors[:, _PUSHING]
-    if np.any(vectors[:, _BY_DRIVE] > 0.0):
-        driven = np.concatenate([driven, vectors[:, : len(NOMINAL)]], axis=1)
-    _, first, own = np.unique(driven, axis=0, return_index=True, return_inverse=True)
-    push = in_parallel(_pushed, [(vectors[k], windows) for k in first], ahead=False)
-    lanes = [(*pair, push[k], windows, laws) for *pair, k in zip(vectors, starts, own.ravel(), strict=True)]
+    push = pushes_of(vectors, windows)
+    lanes = [(*each, windows, laws) for each in zip(vectors, starts, push, strict=True)]
     whole = np.stack([np.asarray(one) for one in in_parallel(_moved, lanes, ahead=False)])
     return whole.transpose(0, 2, 1, 3).reshape(len(whole), whole.shape[2], -1)
 
@@ -103,7 +95,7 @@ def _of_rims(vectors: Array, lanes: Array, windows: Windows, laws: Laws | None, 
 def motion_of(vector: Array, starts: Array, windows: Windows, laws: Laws | None = None) -> list[np.ndarray]:
     """x, y, heading, v, w (windows, rows) at each row, and the mean pushes from there on (windows, rows, 2)."""
     windows = jax.tree.map(jnp.asarray, windows)
-    push = _pushed(vector, windows)
+    (push,) = pushes_of(vector[None], windows)
     states = [np.asarray(part).T for part in _tracked(vector, starts, push, windows, laws)]
     return [*states, np.asarray(push.mean).mean(axis=1).transpose(2, 0, 1)]
 

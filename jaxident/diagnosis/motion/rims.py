@@ -13,7 +13,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.motion.paths import push_of, rolled
+from jaxident.diagnosis.motion.driving import pushes_of
+from jaxident.diagnosis.motion.paths import rolled
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.coordinates import POSES_ONLY, of_wheels
 from jaxident.effects.discovered import Laws
@@ -57,14 +58,14 @@ def untold(windows: Windows) -> frozenset[str]:
     return POSES_ONLY if windows.wheels is None else frozenset()
 
 
-_rolled, _pushed = jax.jit(rolled), jax.jit(push_of)
+_rolled = jax.jit(rolled)
 
 
 def rim_speeds(vectors: Array, starts: Array, windows: Windows, laws: Laws | None = None) -> np.ndarray:
     """Speed [m/s] and turn rate [rad/s] of the rims (batch, windows, numbers) at vectors (batch, SIZE) and starts
     (batch, 5, windows)."""
     windows, vectors = jax.tree.map(jnp.asarray, windows), of_wheels(vectors)
-    push = in_parallel(_pushed, [(vector, windows) for vector in vectors], ahead=False)
+    push = pushes_of(vectors, windows)
     lanes = [(*each, windows, laws) for each in zip(vectors, starts, push, strict=True)]
     found = in_parallel(_rolled, lanes, ahead=False)
     return np.stack([np.concatenate([np.asarray(v).T, np.asarray(w).T], axis=1) for v, w in found])
