@@ -202,8 +202,8 @@ RECORDS = (
         channels=BOTH,
         act=command_polling, rank=1, confused_with=("transport_delay", "motor_lag"), smooth=False,
         grid=(0.02, 0.05, 0.1, 0.2), timed=True, extension=True,
-        search=Search((positive("period", 0.5, stepped=True), Coordinate("phase", 0.0, 0.0, 1.0, 0.5, shape=True)),
-                      seeds=_polls),
+        search=Search((positive("period", 0.5, stepped=True),
+                       Coordinate("phase", 0.0, 0.0, 1.0, 0.5, shape=True, reach=(0.3, 0.04))), seeds=_polls),
     ),
     EffectRecord(
         name="twist_quantisation", site="actuation", stage="command", step=statements.TWIST,

@@ -45,7 +45,14 @@ SHAPES = _pairs("shape")
 """Coordinates that shape an effect, whatever its size, and do nothing alone."""
 
 REACHED = {pair: next(c for c in COORDINATES[pair[0]] if c.name == pair[1]) for pair in sorted(_pairs("reach"))}
-"""Coordinates by which -log p has many valleys, an instant or a step of a comb: looked for where it fits best."""
+"""Coordinates by which -log p has many valleys, an instant, a phase or a step of a comb: looked for where it fits
+best."""
+
+INSTANTS = {
+    (name, each.name) for name in SEARCHED for each in CATALOGUE[name].parameters
+    if each.instant and (name, each.name) in REACHED
+}  # fmt: skip
+"""Those of them that are session times."""
 
 BY_DRIVE = _pairs("by_drive")
 """Coordinates above 0 of which what drives the wheels depends on the nominal drive as well."""

@@ -9,7 +9,7 @@ from jaxident.diagnosis.fit.alike import GAINS, unlikeliness, with_prior
 from jaxident.diagnosis.motion.linear import Linear, follow, gram, linearise, normal
 from jaxident.diagnosis.motion.rims import Rims, rim_speeds
 from jaxident.diagnosis.motion.windows import Windows
-from jaxident.effects.coordinates import NOMINAL, PLACES, REACHED, STEPPED, free_places, limits, neutral_vector, sizes
+from jaxident.effects.coordinates import INSTANTS, NOMINAL, PLACES, STEPPED, free_places, limits, neutral_vector, sizes
 from jaxident.effects.discovered import Laws
 from jaxident.effects.effect import EDGE
 
@@ -25,7 +25,7 @@ the runs tell nothing of a wheel, a free step would overshoot by up to pi/2 time
 gain of a wheel that hardly ever passed its dead zone went to -4e25. One time the gains brings both wheels back."""
 WIDE = 10.0
 """Deviation of a coordinate of which the runs say nothing, in its typical sizes. No other value was tried."""
-INSTANTS = [PLACES[pair] for pair, coordinate in REACHED.items() if not coordinate.relative]
+_INSTANTS = [PLACES[pair] for pair in sorted(INSTANTS)]
 COUPLING = [NOMINAL.index("coupling_1"), NOMINAL.index("coupling_2")]
 PARTS = (1.0, 0.25, 0.0)
 """Of the step of a window's start state that are tried."""
@@ -118,7 +118,7 @@ def bounds(windows: Windows) -> tuple[np.ndarray, np.ndarray]:
     """The lowest and highest vector (SIZE,) of a search on some windows."""
     low, high = limits()
     session = float(windows.session[-1] + windows.t[-1, -1])
-    low[INSTANTS], high[INSTANTS] = EDGE * session, (1.0 - EDGE) * session
+    low[_INSTANTS], high[_INSTANTS] = EDGE * session, (1.0 - EDGE) * session
     return low, high
 
 
