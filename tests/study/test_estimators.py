@@ -38,7 +38,8 @@ def test_likelihood_knows_of_the_camera_and_the_papers_method_does_not():
 def test_batch_claims_what_its_dead_zones_scatter():
     """The heading's equation determines them; an average with those of the path length would claim twenty times more.
     Forty trials tell a standard deviation to 11 %."""
-    study = SMALL._replace(seeds=40, samples=(200,), hold=8, noise=(1e-5,), excitations=("multilevel",), chunk=40)
+    study = SMALL._replace(estimators=(Choice("batch", "batch"),), seeds=40, samples=(200,), hold=8, noise=(1e-5,),
+                           excitations=("multilevel",), chunk=40)  # fmt: skip
     trials = study_arrays(study._replace(robots=(Candidate("diagonal", DIAGONAL),)))
     zones = trials.sel(parameter=["dead_zone_r", "dead_zone_l"])
     scatter = (zones["estimate"] - zones["truth"]).std("seed", ddof=1).values.ravel()
