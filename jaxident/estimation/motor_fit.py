@@ -12,10 +12,13 @@ from jaxident.array_types import Array
 from jaxident.errors import InputError
 from jaxident.estimation.poses.wheel_colour import samples_each
 from jaxident.estimation.suspicions.clock_offset import follow_commands
+from jaxident.estimation.suspicions.wheel_answer import LONGEST
 from jaxident.log import Log, run_begins
 
 STEPS, ENOUGH = 60, 1e-9
 """Most steps of the search, and the part of the squares that a step must take away for the search to go on."""
+LOG_RATE, MOST_ZONE = 9.0, 0.9
+"""Bounds of the search: of the logarithm of a rate [1/s] either way, and of dead zones in largest commands."""
 SMALLEST = 50
 """Rows with both wheel speeds that are needed at least."""
 
@@ -60,6 +63,9 @@ def wheel_runs(log: Log) -> list[WheelRun]:
             count += len(rows)
     if count < SMALLEST:
         raise InputError(f"{count} rows with both wheel speeds: at least {SMALLEST} are needed")
+    for name, side in (("u_r", 0), ("u_l", 1)):
+        if not any(np.any(run.command[:, side]) for run in found):
+            raise InputError(f"{name} is 0 throughout: drive both wheels, at several levels")
     return found
 
 
@@ -92,14 +98,15 @@ def fitted(runs: list[WheelRun], point: Array) -> MotorFit:
 
 def search(runs: list[WheelRun], point: Array, largest: float, late: bool = True) -> MotorFit:
     """The best fit downhill of a point; `late`: whether a delay is looked for."""
-    low, high = np.array([-9.0, -9.0, 0.0, 0.0, 0.0]), np.array([9.0, 9.0, 5.0, 0.9 * largest, 0.9 * largest])
+    zone = MOST_ZONE * largest
+    low, high = np.array([-LOG_RATE] * 2 + [0.0] * 3), np.array([LOG_RATE] * 2 + [LONGEST, zone, zone])
     free = [0, 1, 2, 3, 4] if late else [0, 1, 3, 4]
     now, damping = fitted(runs, np.clip(point, low, high)), 1e-3
     for _ in range(STEPS):
         slopes = _slopes(lambda point: fitted(runs, point).residual, now.point, largest)[:, free]
         own = slopes.T @ slopes
-        step = np.zeros(5)
-        step[free] = -np.linalg.solve(own + damping * np.diag(np.diagonal(own) + 1e-300), slopes.T @ now.residual)
+        step, size = np.zeros(5), np.diagonal(own)
+        step[free] = -np.linalg.solve(own + damping * np.diag(size + 1e-12 * size.max()), slopes.T @ now.residual)
         there = fitted(runs, np.clip(now.point + step, low, high))
         if there.squares < now.squares:
             gained, now, damping = now.squares - there.squares, there, max(0.2 * damping, 1e-9)

@@ -17,10 +17,10 @@ def speeds_of_counts(counts: WheelSpeeds, per_turn: float, wraps_at: float | Non
     """Wheel speeds [rad/s] of counts at some times, and a line that says how fine they are.
 
     The speed at a count is that from the one before to the one after, at the ends from or to the only neighbour: so it
-    is neither early nor late. per_turn: counts in one turn of the wheel, 2 pi for
-    an angle in radians. wraps_at: the number at which the counter begins again at zero, 65536 for 16 bits; a step is
-    then taken the short way round. Rows with one wheel alone are left out. InputError for fewer than two rows with both
-    counts, and for a counter that seems to wrap and no `wraps_at`.
+    is neither early nor late. per_turn: counts in one turn of the wheel, 2 pi for an angle in radians. wraps_at: the
+    number at which the counter begins again at zero, 65536 for 16 bits; a step is then taken the short way round. Rows
+    with one wheel alone are left out. InputError for fewer than two rows with both counts, and for a counter that seems
+    to wrap and no `wraps_at`.
     """
     t, both = latest("wheel counts", counts.t, counts.speed)
     known = np.isfinite(np.stack(both)).all(axis=0)
@@ -50,7 +50,8 @@ def _check_no_wrap(t: np.ndarray, step: np.ndarray) -> None:
     wheel, place = np.unravel_index(int(np.argmax(speed[:, 1:-1] / around)), around.shape)
     if speed[wheel, place + 1] > JUMP * around[wheel, place]:
         size = float(np.abs(step[wheel, place + 1]))
+        likely = 2.0 * math.pi if size <= 2.0 * math.pi else 1 << math.ceil(math.log2(size))
         raise InputError(
             f"wheel counts: a single step of {size:.10g} from t = {t[place + 1]:.10g} to {t[place + 2]:.10g} s: does "
-            f"the counter begin again there? `--wheel-counter {1 << math.ceil(math.log2(size))}` says at which number"
+            f"the counter begin again there? `--wheel-counter {likely:.7g}` says at which number"
         )

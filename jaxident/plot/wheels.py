@@ -8,6 +8,7 @@ import numpy as np
 from jaxident.plot import style
 
 SPEEDS = (("speed", "m/s"), ("turn rate", "rad/s"))
+"""What the upper two strips show, and its unit."""
 
 
 def wheel_speeds(

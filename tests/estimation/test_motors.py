@@ -121,6 +121,7 @@ def test_what_tells_nothing_of_motors_is_refused():
         (log._replace(wheel_r=None, wheel_l=None), "no wheel speeds"),
         (log._replace(wheel_r=noise[0], wheel_l=noise[1]), "do not follow the commands"),
         (log.rows(0, 20), "20 rows with both wheel speeds: at least 50"),
+        (log._replace(u_l=0.0 * log.u_l), "u_l is 0 throughout"),
     ]
     for bad, line in cases:
         with pytest.raises(ji.InputError, match=line):

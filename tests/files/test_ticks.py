@@ -39,6 +39,12 @@ def test_a_wrap_that_nobody_told_of_is_refused_with_the_option_that_mends_it():
         speeds_of_counts(counts(65536), TURN)
 
 
+def test_an_angle_that_wraps_is_a_counter_of_a_turn():
+    wrapped = WheelSpeeds(T, Wheels(*(angle % (2.0 * np.pi) for angle in ANGLE)))
+    with pytest.raises(InputError, match=r"`--wheel-counter 6\.283185`"):
+        speeds_of_counts(wrapped, 2.0 * np.pi)
+
+
 def test_angles_are_counts_of_which_a_turn_has_two_pi():
     found, _ = speeds_of_counts(WheelSpeeds(T, Wheels(*ANGLE)), 2.0 * np.pi)
     np.testing.assert_allclose(found.speed.right, np.gradient(ANGLE[0], 0.1), atol=1e-9)

@@ -90,7 +90,6 @@ class Finding(NamedTuple):
 def find_effects(prepared: Prepared, without: Collection[str] = (), law: Law | None = None) -> tuple[Prepared, Finding]:
     """The search on prepared windows, and these with the commands that arrived where some were lost. `without`: effects
     that the catalogue is to lack. A noise law that is given stays as it is."""
-    without = {*without, *untold(prepared.windows)}
     found = search(prepared.windows, prepared.nominal, without, law)
     if found.lost is not None:
         prepared = repaired(prepared, found.lost)
@@ -101,7 +100,7 @@ def finding_of(prepared: Prepared, found: Found, without: Collection[str] = ()) 
     """The finding of a search that has ended."""
     settled = found.settled
     nominal = found.nominal if settled.now.effects else settled.now.fit
-    values = neighbours(settled, nominal, without)
+    values = neighbours(settled, nominal, {*without, *untold(settled.data.windows)})
     return Finding(settled.data, found.law, found.likely, nominal, settled.now.fit, settled.now.effects, values,
                    found.rest, settled.table)  # fmt: skip
 

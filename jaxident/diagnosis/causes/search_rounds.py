@@ -21,7 +21,7 @@ from jaxident.diagnosis.causes.search import MOST_EFFECTS, best_set
 from jaxident.diagnosis.causes.settled import Settled, noise_beside, same_law, whiten
 from jaxident.diagnosis.fit.refit import Data, Solution, refit
 from jaxident.diagnosis.motion.responses import respond
-from jaxident.diagnosis.motion.rims import first_noise
+from jaxident.diagnosis.motion.rims import first_noise, untold
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.diagnosis.noise.law import Law, first_law
 from jaxident.diagnosis.noise.sizing import size_noise
@@ -76,7 +76,7 @@ def search(windows: Windows, nominal: Solution, without: Collection[str] = (), l
     camera's error, and a search that takes all of that for effects may lose its way. Where both ends are worse than
     no effect at all, no effect is named.
     """
-    begin, sized = Move(nominal, (), -nominal.cost), law is None
+    begin, sized, without = Move(nominal, (), -nominal.cost), law is None, {*without, *untold(windows)}
     wheel = first_noise(nominal.linear.rims, np.exp(nominal.vector[:2]), windows)
     law = first_law(windows)._replace(wheel=wheel) if law is None else law
     ends = [climb(windows, nominal, begin, law, without, sized)]

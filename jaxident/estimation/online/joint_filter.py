@@ -100,8 +100,7 @@ def init(log: Log, *, d_max: Array, memory: Array = jnp.inf, noise_law: str = "w
     d_max: largest dead zone [unit of the command]. memory [s]: how long the parameters remember; infinite for a robot
     that does not change. A change is followed after about one memory of rich input. A log that leaves a parameter open,
     such as one with a single level above a dead zone, gives a state that is never `ok`. Of a log with wheel speeds
-    radius and track are found, too, and stay as they are. InputError for an unknown law or several runs. Needs double
-    precision.
+    radius and track are found, too. InputError for an unknown law or several runs. Needs double precision.
     """
     require_float64("joint_filter.init")
     require_log(log, "joint_filter.init")
