@@ -13,7 +13,7 @@ from jaxident.array_types import Pose, State
 from jaxident.effects import CATALOGUE, run_full
 from jaxident.effects.apply import sized
 from jaxident.effects.catalogue import to_vector
-from jaxident.effects.coordinates import SEARCHED
+from jaxident.effects.coordinates import POSES_ONLY, SEARCHED
 from jaxident.plot import style
 from jaxident.report.page import PHONE
 
@@ -47,7 +47,7 @@ def asymmetry(_: int) -> Answer:
 def smallest_effect(_: int) -> Answer:
     """How small an effect can be found?"""
     inputs = ji.excite(jax.random.key(0), "multilevel", SEEN_ROWS, PERIOD, hold=15)
-    names = list(SEARCHED)
+    names = [name for name in SEARCHED if name not in POSES_ONLY]
     gain = np.array([_gain(name, inputs) for name in names])  # (effects, strengths)
     power = stats.ncx2.sf(stats.chi2.isf(ALARMS / len(names), 1), 1, np.maximum(gain, 1e-12))
     sizes = np.array([[_crossing(row, level) for level in (0.1, 0.5, 0.9)] for row in power])
