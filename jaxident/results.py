@@ -97,8 +97,7 @@ class Motors(identify_motors.Motors):
     logs: list[Log]
 
     def __repr__(self) -> str:
-        largest = max(float(np.max(np.abs(u))) for log in self.logs for u in log.command)
-        return "\n".join([*lines_of(self), *_aligned(rows_of(self, largest)), *identify_motors.against(self)])
+        return "\n".join([*lines_of(self), *_aligned(rows_of(self, self.logs)), *identify_motors.against(self)])
 
     def save(self, path: str | os.PathLike) -> None:
         """Write the model to a file, whole or not at all."""

@@ -42,8 +42,8 @@ def command(logs, radius, track, columns, out, report, json_file):
     made = origin("--out", logs=find_logs(logs))
     model = dataclasses.replace(found.model, provenance=with_origin(found.model.provenance, made))
     found = found._replace(model=model)
-    rows = rows_of(found, max(float(abs(u).max()) for record in records for u in record.command))
-    click.echo(table([("parameter", "estimate", "95 % interval", "unit", "this input"), *rows]))
+    heads = ("parameter", "estimate", "95 % interval", "unit", "this input")
+    click.echo(table([heads, *rows_of(found, records)]))
     click.echo("\n".join(lines_of(found)))
     if out:
         save_model(model, out)

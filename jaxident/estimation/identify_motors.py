@@ -17,18 +17,19 @@ from jaxident.array_types import Array
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.errors import InputError
 from jaxident.estimation.motor_fit import MotorFit, WheelRun, covariance_of, search, wheel_runs
+from jaxident.estimation.suspicions.heading import SURE as CLEAR
 from jaxident.estimation.suspicions.wheel_answer import answer_of_wheels
+from jaxident.estimation.suspicions.wheel_suspicions import WRONG_WHEELS
 from jaxident.log import Log, join
 from jaxident.robot.drive import Physical
-from jaxident.robot.model import Effect, Model, Provenance, Spread
+from jaxident.robot.model import Effect, Model, Provenance, Spread, require_physical
 from jaxident.robot.wheel_sensor import WheelSensor
 
 ZONES = (0.02, 0.1, 0.3)
-"""Dead zones, in largest commands, from which the search begins; the best end is taken."""
+"""Dead zones, in largest commands, from which the search begins; the best end is taken. No others were tried."""
 SURE = 2.0
-"""Standard deviations from zero from which a delay is believed."""
-CLEAR = 5.0
-"""Standard deviations from zero from which the sign of a gain is believed."""
+"""Standard deviations from zero from which a delay is believed. No other number was tried."""
+NEITHER = "the wheels do not turn as they are told: commands or wheel speeds are in a wrong order or have a wrong sign"
 ORDER = ("rate_1", "rate_2", "gain_11", "gain_12", "gain_21", "gain_22", "dead_zone_r", "dead_zone_l")
 (DELAY,) = (name for name, record in CATALOGUE.items() if record.quantity == "delay")
 """The effect of the catalogue that makes commands late, whose first parameter is by how much."""
@@ -39,8 +40,6 @@ class Motors(NamedTuple):
 
     Attributes:
         model: the robot that moves as its wheels turn: no slip, no camera.
-        drive: its rates and gains.
-        sensor: radius, track and noise of the wheel speeds.
         delay: from a command to the first answer [s]; 0 where it is less than SURE of its deviations.
         delay_deviation: its standard deviation [s].
         explained: share of the squares of the mean and of half the difference of the wheel speeds that the model
@@ -51,14 +50,23 @@ class Motors(NamedTuple):
     """
 
     model: Model
-    drive: Physical
-    sensor: WheelSensor
     delay: float
     delay_deviation: float
     explained: Any
     every: float
     measured: Any
     modelled: Any
+
+    @property
+    def drive(self) -> Physical:
+        """Rates (2,) [1/s] and gains (2, 2) of the model."""
+        return require_physical(self.model)
+
+    @property
+    def sensor(self) -> WheelSensor:
+        """Radius [m], track [m] and noise [rad/s] of the wheel speeds."""
+        assert self.model.wheels is not None  # `identify_motors` gives every model one
+        return self.model.wheels
 
 
 def against(found: Motors) -> tuple[str, ...]:
@@ -68,13 +76,7 @@ def against(found: Motors) -> tuple[str, ...]:
     signs = np.sign(gain).astype(int).ravel().tolist()
     if not np.all(np.abs(gain).ravel() > CLEAR * deviation) or signs == [1, 1, 1, -1]:
         return ()
-    mend = {
-        (1, 1, -1, 1): "right and left are swapped: `--columns wheel_r=wheel_l,wheel_l=wheel_r`",
-        (-1, -1, -1, 1): "both have the wrong sign: `--columns wheel_r=wheel_r:-1,wheel_l=wheel_l:-1`",
-        (-1, 1, -1, -1): "the right one has the wrong sign: `--columns wheel_r=wheel_r:-1`",
-        (1, -1, 1, 1): "the left one has the wrong sign: `--columns wheel_l=wheel_l:-1`",
-    }.get(tuple(signs), "commands or wheel speeds are in a wrong order or have a wrong sign")
-    return (f"the wheels do not turn as they are told, {mend}",)
+    return (WRONG_WHEELS.get((signs[0], signs[1], signs[2], signs[3]), NEITHER),)
 
 
 def identify_motors(logs: Log | Sequence[Log], radius: float, track: float) -> Motors:
@@ -140,17 +142,16 @@ def _told(
     key = CATALOGUE[DELAY].parameters[0].name
     names = (*ORDER, f"{DELAY}.{key}") if late else ORDER
     noise = float(np.sqrt(fit.squares / max(len(fit.residual) - 9, 1)))
-    drive, sensor = Physical(rates, gain), sensor._replace(noise=noise)
     model = Model(
-        float(np.median(np.concatenate([np.diff(run.t) for run in runs]))), drive, fit.point[3:],
+        float(np.median(np.concatenate([np.diff(run.t) for run in runs]))), Physical(rates, gain), fit.point[3:],
         effects=(Effect(DELAY, {key: delay}, {key: float(deviation[8])}),) if late else (),
         standard_deviation=Spread(dead_zone=deviation[6:8],
                                   physical=Physical(deviation[:2], deviation[2:6].reshape(2, 2), np.zeros(2))),
         covariance=whole[: len(names), : len(names)], parameter_order=names,
-        provenance=Provenance(method="wheel speeds alone"), wheels=sensor,
+        provenance=Provenance(method="wheel speeds alone"), wheels=sensor._replace(noise=noise),
     )  # fmt: skip
     measured, modelled = np.full((2, 2, len(log.t)), np.nan)
     for own, values in ((measured, np.concatenate([run.speed for run in runs], axis=1)), (modelled, fit.modelled)):
         own[:, np.concatenate([run.rows for run in runs])] = values
     left = np.nansum((measured - modelled) ** 2, axis=1) / np.maximum(np.nansum(measured**2, axis=1), 1e-300)
-    return Motors(model, drive, sensor, delay, float(deviation[8]), 1.0 - left, every, measured, modelled)
+    return Motors(model, delay, float(deviation[8]), 1.0 - left, every, measured, modelled)

@@ -16,11 +16,12 @@ from jaxident.estimation.suspicions.wheel_answer import LONGEST
 from jaxident.log import Log, run_begins
 
 STEPS, ENOUGH = 60, 1e-9
-"""Most steps of the search, and the part of the squares that a step must take away for the search to go on."""
+"""Most steps of the search, and the part of the squares that a step must take away for the search to go on. No
+others were tried."""
 LOG_RATE, MOST_ZONE = 9.0, 0.9
 """Bounds of the search: of the logarithm of a rate [1/s] either way, and of dead zones in largest commands."""
 SMALLEST = 50
-"""Rows with both wheel speeds that are needed at least."""
+"""Rows with both wheel speeds that are needed at least. No other number was tried."""
 
 
 class WheelRun(NamedTuple):

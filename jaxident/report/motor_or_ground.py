@@ -3,15 +3,17 @@
 import numpy as np
 
 from jaxident import plot
-from jaxident.diagnosis.account.odometry import Odometry, steps_of_poses, steps_of_run, steps_of_wheels
+from jaxident.diagnosis.account.odometry import Odometry, steps_of_run
 from jaxident.diagnosis.diagnose import Diagnosis
+from jaxident.estimation.suspicions.motions import increments_of
+from jaxident.estimation.suspicions.wheel_answer import turns_of_wheels
 from jaxident.report.page import PHONE, Figure, Section, Table
 from jaxident.report.words import angle, error, length, plain_text
 
 LEAD = 15
 """Rows before the stretch that the picture shows: what was commanded just before."""
 HEADS = {"nominal": "nominal model", "corrected": "corrected model", "wheels": "as its wheels turned",
-         "wheels_late": "as its wheels turned, as late as the camera"}  # fmt: skip
+         "wheels_late": "as its wheels turned, delayed like the camera"}  # fmt: skip
 
 
 def motor_or_ground(found: Diagnosis) -> list[Section]:
@@ -31,9 +33,9 @@ def motor_or_ground(found: Diagnosis) -> list[Section]:
 
 TEXT = (
     "The wheels say what the motors did; the poses say what became of it. Here a robot is taken to move exactly as its "
-    "wheels turned. Its radius of {radius} and track of {track} are those that suit the fitted runs best. What this "
-    "robot gets right and the nominal model does not lies before the wheels: in the command, the motors, the load. "
-    "What it gets wrong itself lies behind them: on the ground or in the camera."
+    "wheels turned. Its radius of {radius} and track of {track} are those that suit the fitted runs best. If this "
+    "robot is right where the nominal model is wrong, the cause lies before the wheels: in the command, the motors, or "
+    "the load. If it is wrong as well, the cause lies behind them: on the ground or in the camera."
 )
 PICTURE = (
     "The stretch on which the nominal model errs most. Where the wheels leave the model, the cause lies before the "
@@ -64,7 +66,7 @@ def _picture(found: Diagnosis, told: Odometry) -> list[Figure]:
     run, row = found.prepared.log.runs()[starts.run[worst]], int(starts.row[worst])
     own = run.rows(max(row - LEAD, 0), row + rows + 1)
     t, wheels = np.asarray(own.t), np.stack([own.wheel_r, own.wheel_l])
-    rims = steps_of_wheels(t, wheels) / np.diff(t)
+    rims = turns_of_wheels(t, wheels) / np.diff(t)
     rims *= np.array([[told.sensor.radius], [told.sensor.radius / told.sensor.track]])
     ahead = np.asarray(run.t)[row + 1 : row + 1 + rows]
     models = {
@@ -82,4 +84,4 @@ def _picture(found: Diagnosis, told: Odometry) -> list[Figure]:
 
 def _speeds(t: np.ndarray, path: np.ndarray) -> np.ndarray:
     """Speed and turn rate (2, rows - 1) of poses (rows, 3)."""
-    return steps_of_poses(path.T) / np.diff(t)
+    return increments_of(path.T) / np.diff(t)

@@ -1,5 +1,6 @@
 """Motors by their wheel speeds: the table, some lines, and a page."""
 
+from collections.abc import Sequence
 from importlib.metadata import version
 from os import PathLike
 
@@ -18,9 +19,9 @@ SHOWN = 15.0
 """Seconds that the picture shows."""
 
 
-def rows_of(found: Motors, largest: float) -> list[tuple[str, ...]]:
-    """A row per parameter of the drive: name, estimate, interval, unit, verdict; largest: of the commands."""
-    model = found.model
+def rows_of(found: Motors, logs: Sequence[Log]) -> list[tuple[str, ...]]:
+    """A row per parameter of the drive: name, estimate, interval, unit, verdict; logs: in which they were found."""
+    model, largest = found.model, float(np.nanmax(np.abs(np.stack(join(logs).command))))
     values = np.array([*np.asarray(found.drive.rate), *np.ravel(found.drive.gain), *np.asarray(model.dead_zone)])
     covariance = np.asarray(model.covariance)[: len(ORDER), : len(ORDER)]
     rows = [told(row) for row in verdicts_of(ORDER, values, covariance, largest)]
@@ -50,11 +51,11 @@ def lines_of(found: Motors) -> list[str]:
     ]
 
 
-def write_motors(found: Motors, logs: list[Log], path: str | PathLike) -> None:
+def write_motors(found: Motors, logs: Sequence[Log], path: str | PathLike) -> None:
     """Write the page of one identification of motors."""
     log = join(logs)
-    rows = rows_of(found, float(np.nanmax(np.abs(np.stack(log.command)))))
-    table = Table(("parameter", "estimate", f"95{SPACE}% interval", "unit", "this input"), rows, CAPTION)
+    heads = ("parameter", "estimate", f"95{SPACE}% interval", "unit", "this input")
+    table = Table(heads, rows_of(found, logs), CAPTION)
     sections = [
         Section("What the wheels did", [_picture(found, log)]),
         Section("Parameters", [table]),

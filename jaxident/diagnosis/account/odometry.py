@@ -1,7 +1,7 @@
 """A robot that moves as its wheels turned, beside the models: is it the motors, or the ground?
 
-What measured wheels know and a model does not lies before them: command, motors, load. What they do not know either
-lies behind them, on the ground or in the camera. Nothing is assumed of either. NumPy alone.
+If this robot is right where a model is wrong, the cause lies before the wheels: command, motors, load. If it is wrong
+as well, the cause lies behind them: on the ground or in the camera. Nothing is assumed of either. NumPy alone.
 """
 
 from typing import Any, NamedTuple
@@ -11,6 +11,8 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.diagnosis.preparation.prepare import Prepared
 from jaxident.effects.coordinates import POSES_ONLY
+from jaxident.estimation.suspicions.motions import increments_of
+from jaxident.estimation.suspicions.wheel_answer import turns_of_wheels
 from jaxident.log import Log, run_begins
 from jaxident.robot.model import Model
 from jaxident.robot.wheel_sensor import WheelSensor
@@ -95,7 +97,7 @@ def _added_up(run: Log, rows: int) -> tuple[np.ndarray, np.ndarray]:
     """How far the robot of a run moves and turns, and how far its wheels turn meanwhile, added up over stretches of
     rows (2, stretches); a step between two poses counts where no wheel speed is missing."""
     seen, moved = steps_of_run(run)
-    turned = steps_of_wheels(np.asarray(run.t), np.stack([run.wheel_r, run.wheel_l]))
+    turned = turns_of_wheels(np.asarray(run.t), np.stack([run.wheel_r, run.wheel_l]))
     known = np.isfinite(turned).all(axis=0)
     total = np.cumsum(np.pad(np.where(known, turned, 0.0), ((0, 0), (1, 0))), axis=1)
     holes = np.cumsum(np.append(0, ~known))
@@ -107,32 +109,16 @@ def _added_up(run: Log, rows: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def steps_of_run(run: Log) -> tuple[np.ndarray, np.ndarray]:
-    """The rows (n,) of a run that have a pose, and distance along the mean heading [m] and turn [rad] from each to the
-    next (2, n - 1)."""
+    """The rows (n,) of a run that have a pose, and path length [m] and turn [rad] from each to the next (2, n - 1)."""
     pose = np.stack([np.asarray(column, float) for column in run.pose])
     seen = np.flatnonzero(np.isfinite(pose).all(axis=0))
-    return seen, steps_of_poses(pose[:, seen])
-
-
-def steps_of_wheels(t: Array, speeds: Array) -> np.ndarray:
-    """How far wheels turn [rad] from row to row: their mean and right less left (2, ..., rows - 1), by trapezoids of
-    their speeds (2, ..., rows)."""
-    turned = 0.5 * (speeds[..., 1:] + speeds[..., :-1]) * np.diff(t)
-    return np.stack([0.5 * (turned[0] + turned[1]), turned[0] - turned[1]])
-
-
-def steps_of_poses(pose: Array) -> np.ndarray:
-    """Distance along the mean heading [m] and turn [rad] from row to row (2, rows - 1) of poses (3, rows)."""
-    x, y, theta = pose
-    turn = (np.diff(theta) + np.pi) % (2.0 * np.pi) - np.pi
-    middle = theta[:-1] + 0.5 * turn
-    return np.stack([np.diff(x) * np.cos(middle) + np.diff(y) * np.sin(middle), turn])
+    return seen, increments_of(pose[:, seen])
 
 
 def follow_wheels(sensor: WheelSensor, t: Array, speeds: Array, begin: Array) -> np.ndarray:
     """Poses (n, rows, 3) of a robot that rolls as its wheels turn at speeds (2, n, rows) [rad/s], from poses (n, 3) at
     the first row; arcs from row to row."""
-    together, against = steps_of_wheels(t, speeds)
+    together, against = turns_of_wheels(t, speeds)
     along, turn = sensor.radius * together, sensor.radius / sensor.track * against
     theta = begin[:, 2:] + np.cumsum(turn, axis=1)
     middle = theta - 0.5 * turn

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Pose, Wheels
+from jaxident.estimation.suspicions.motions import increments_of
 from jaxident.estimation.suspicions.whitening import (
     ORDER,
     autoregression,
@@ -67,12 +68,8 @@ class Response(NamedTuple):
 
 def streams_of(command_t: Any, command: Wheels, pose_t: Any, pose: Pose) -> Streams:
     """Streams from commands and poses that were recorded apart."""
-    x, y, theta = (np.asarray(column, float) for column in pose)
-    turn = (np.diff(theta) + np.pi) % (2.0 * np.pi) - np.pi
-    middle = theta[:-1] + 0.5 * turn
-    along = (np.diff(x) * np.cos(middle) + np.diff(y) * np.sin(middle)) / np.sinc(turn / (2.0 * np.pi))
     t = np.asarray(pose_t, float)
-    ends, increment = np.stack([t[:-1], t[1:]], axis=1), np.stack([along, turn], axis=1)
+    ends, increment = np.stack([t[:-1], t[1:]], axis=1), increments_of(pose).T
     return Streams(np.asarray(command_t, float), np.stack(command, axis=1).astype(float), ends, increment)
 
 
@@ -125,7 +122,9 @@ def _lagged(t: np.ndarray, u: np.ndarray, rate: float) -> np.ndarray:
 
 
 def follow_commands(t: np.ndarray, u: np.ndarray, rate: float, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """F and f (len(at), columns) at any times; before the first command nothing was commanded."""
+    """Commands u (n, columns), each held from its time t [s] on, through a lag of a rate [1/s] from rest: the integral
+    of what comes out, and what comes out, both (len(at), columns) at any times `at` [s]. Before the first command
+    nothing was commanded."""
     start = _lagged(t, u, rate)
     area = np.concatenate([np.zeros((1, u.shape[1])), np.cumsum(np.diff(t)[:, None] * u[:-1], axis=0)])
     k = np.maximum(np.searchsorted(t, at, side="right") - 1, 0)

@@ -44,3 +44,12 @@ def motions(log: Log, lag: int = 1, read: Callable[[np.ndarray], np.ndarray] = n
              theta[rows] + 0.5 * turn, turn)
         )  # fmt: skip
     return Motions(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+
+
+def increments_of(pose: Any) -> np.ndarray:
+    """Path length [m] and turn [rad] from each pose to the next (2, m - 1); poses x, y, theta (3, m) without gaps."""
+    x, y, theta = (np.asarray(column, float) for column in pose)
+    turn = (np.diff(theta) + np.pi) % (2.0 * np.pi) - np.pi
+    rows = np.arange(len(turn))
+    moved = Motions(np.zeros_like(rows), rows, np.diff(x), np.diff(y), theta[:-1] + 0.5 * turn, turn)
+    return np.stack([moved.along(), turn])

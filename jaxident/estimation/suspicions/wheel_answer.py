@@ -51,11 +51,18 @@ def _of_run(run: Log, turning: np.ndarray, begin: float) -> Streams:
     """The commands of a run, and what its wheels turned from sample to sample: trapezoids of mean and difference."""
     t = np.asarray(run.t, float) - run.t[0] + begin
     command = Wheels(*(np.nan_to_num(u) for u in run.command))
-    right, left = (np.asarray(speed)[turning] for speed in (run.wheel_r, run.wheel_l))
-    speed, own = np.stack([0.5 * (right + left), right - left], axis=1), t[turning]
-    turned = 0.5 * (speed[1:] + speed[:-1]) * np.diff(own)[:, None]
+    own = t[turning]
+    turned = turns_of_wheels(own, np.stack([run.wheel_r, run.wheel_l])[:, turning]).T
     ends = np.stack([own[:-1], own[1:]], axis=1)
     return Streams(np.append(t, t[-1] + 1e-3), np.pad(np.stack(command, axis=1), ((0, 1), (0, 0))), ends, turned)
+
+
+def turns_of_wheels(t: np.ndarray, speeds: np.ndarray) -> np.ndarray:
+    """How far wheels turn [rad] from row to row, (2, ..., rows - 1): the mean of both, and right less left.
+
+    By trapezoids of speeds (2, ..., rows) [rad/s], right and left, at times t (..., rows) [s]."""
+    turned = 0.5 * (speeds[..., 1:] + speeds[..., :-1]) * np.diff(t)
+    return np.stack([0.5 * (turned[0] + turned[1]), turned[0] - turned[1]])
 
 
 def late_wheels(log: Log) -> tuple[str, ...]:

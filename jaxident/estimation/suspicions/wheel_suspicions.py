@@ -31,6 +31,18 @@ NEAR_ONE = 0.1
 """Radii [m] this near to 1 look like rim speeds in m/s; robots have smaller wheels."""
 
 
+WRONG_WHEELS: dict[Signs, str] = {
+    AGAINST: "the wheel speeds of right and left are swapped: `--columns wheel_r=wheel_l,wheel_l=wheel_r`",
+    (-1, -1, -1, 1): "both wheel speeds have the wrong sign: `--columns wheel_r=wheel_r:-1,wheel_l=wheel_l:-1`",
+    BACKWARDS: "both wheel speeds have the wrong sign and are swapped: `--columns "
+    "wheel_r=wheel_l:-1,wheel_l=wheel_r:-1`",
+    (-1, 1, -1, -1): "the right wheel's speed has the wrong sign: `--columns wheel_r=wheel_r:-1`",
+    (1, -1, 1, 1): "the left wheel's speed has the wrong sign: `--columns wheel_l=wheel_l:-1`",
+}
+"""What is wrong with wheel speeds, and what mends it, by the signs of four gains: right and left along, right and left
+in heading; of the motion by wheel speeds, or of these by commands."""
+
+
 class WheelCheck(NamedTuple):
     """Whether the wheel speeds can be used beside the camera, and what is suspected of them, a line each."""
 
@@ -119,16 +131,8 @@ def wheel_signs(response: Response) -> str:
         return "the camera sees motion that does not follow the wheel speeds: are they of this robot, and on its clock?"
     if not clear.all():
         return ""
-    found: dict[Signs, str] = {
-        AGAINST: "the robot turns against its wheel speeds, right and left are swapped: `--columns "
-        "wheel_r=wheel_l,wheel_l=wheel_r`",
-        (-1, -1, -1, 1): "both wheel speeds have the wrong sign: `--columns wheel_r=wheel_r:-1,wheel_l=wheel_l:-1`",
-        BACKWARDS: "both wheel speeds have the wrong sign and are swapped: `--columns "
-        "wheel_r=wheel_l:-1,wheel_l=wheel_r:-1`",
-        (-1, 1, -1, -1): "the right wheel's speed has the wrong sign: `--columns wheel_r=wheel_r:-1`",
-        (1, -1, 1, 1): "the left wheel's speed has the wrong sign: `--columns wheel_l=wheel_l:-1`",
-    }
-    line = found.get(tuple(int(s) for s in np.sign(response.gain).ravel()), "")
+    signs: Any = tuple(int(s) for s in np.sign(response.gain).ravel())
+    line = WRONG_WHEELS.get(signs, "")
     return f"{line} (signs of the gains, each {SURE:g} standard deviations clear)" if line else ""
 
 
