@@ -21,10 +21,16 @@ from jaxident.diagnosis.preparation.prepare import Prepared, prepare, suspected_
 from jaxident.diagnosis.preparation.translate import to_model
 from jaxident.diagnosis.simulator import Simulator, as_simulator, check_units, inspect_simulator, shared
 from jaxident.errors import InputError
+from jaxident.estimation.poses.prior import RATE
 from jaxident.estimation.suspicions.log_suspicions import log_suspicions
 from jaxident.log import Log, join
 from jaxident.numerics import require_float64
 from jaxident.robot.model import Model
+
+COASTED = (
+    "the poses ask for a robot that coasts, whatever it is told, and such a robot predicts nothing; robots answer "
+    f"within seconds: rates are held at {RATE:g} 1/s, without coupling; wheel speeds would tell them"
+)
 
 
 class Diagnosis(NamedTuple):
@@ -141,7 +147,7 @@ def diagnose(
     nominal = to_model(prepared, finding.nominal.vector, finding.law, (), None, finding.nominal)
     return Diagnosis(verdict, judgement, gap, account, where, selected, parameters, visible(known), replay(known, seed),
                      advice(verdict, judgement, laws), nominal, corrected, shrinks, prepared, finding, surplus,
-                     simulator, laws, (*log_suspicions(join(logs)), *suspected_wheels(join(logs))),
+                     simulator, laws, suspicions_of(join(logs), prepared),
                      refused, odometry(prepared, gap.paths, corrected))  # fmt: skip
 
 
@@ -178,6 +184,11 @@ def see(prepared: Prepared, finding: Finding, simulator: Simulator | None, model
     if given is not None and model is not None:
         given = dataclasses.replace(given, discovered=model.discovered)
     return Seen(finding, extra, shown, measure(prepared, finding, given, common, direct, seed))
+
+
+def suspicions_of(log: Log, prepared: Prepared) -> tuple[str, ...]:
+    """What a log says against itself, its wheel speeds against its poses, and its poses against any robot."""
+    return (*log_suspicions(log), *suspected_wheels(log), *([COASTED] if any(prepared.windows.held) else []))
 
 
 def check_nominal(logs: Log | Sequence[Log], sim: Log | Sequence[Log] | None, model: Model | None) -> None:

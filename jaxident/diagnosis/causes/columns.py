@@ -14,7 +14,7 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.points import differences, points_of, rim_differences, seeded
-from jaxident.diagnosis.fit.alike import with_prior
+from jaxident.diagnosis.fit.prior import with_prior
 from jaxident.diagnosis.fit.refit import Data, Solution
 from jaxident.diagnosis.motion.linear import Linear, gram, linearise, normal
 from jaxident.effects.coordinates import (
@@ -112,7 +112,7 @@ def tabulate(
     products = _less_owned(products, range(len(NOMINAL), base.shape[2]), owned)
     cross = products[:, :-1, -1] + products[:, :-1, base.shape[2] : -1] @ [column.value for column in columns]
     scale = np.array([column.scale for column in columns])
-    products, cross = _eliminated(fit, products[:, :-1, :-1], cross, base.shape[2] if free else len(NOMINAL))
+    products, cross = _eliminated(data, fit, products[:, :-1, :-1], cross, base.shape[2] if free else len(NOMINAL))
     if not free:
         products, cross = _without_rest(products, cross, scale)
     positive = np.array([column.positive for column in columns])
@@ -200,11 +200,11 @@ def _rim_rows(data: Data, fit: Solution, linear: Linear, columns: list[_Column],
     return data.of_rims(own, own.slopes[..., : len(NOMINAL)], none, answers, residual=True)
 
 
-def _eliminated(fit: Solution, products: Array, cross: Array, count: int) -> tuple[np.ndarray, np.ndarray]:
+def _eliminated(data: Data, fit: Solution, products: Array, cross: Array, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Products and cross products of the later columns, the first `count` free but for the nominal robot's prior."""
     summed = np.zeros((len(products[0]) + 1, len(products[0]) + 1))
     summed[:-1, :-1], summed[:-1, -1] = products.sum(axis=0), cross.sum(axis=0)
-    summed = with_prior(summed, fit.vector)
+    summed = with_prior(summed, fit.vector, data.windows)
     whole, right = summed[:-1, :-1], summed[:-1, -1]
     squares = np.diagonal(whole)[:count]
     length = np.sqrt(np.where(squares > 1e-200, squares, 1.0))  # a column that answers nothing takes nothing

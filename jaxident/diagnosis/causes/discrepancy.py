@@ -8,7 +8,7 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.discrepancy_basis import WORTH, Term, library, pursue
 from jaxident.diagnosis.causes.wheel_periodicity import rhythms
-from jaxident.diagnosis.fit.alike import with_prior
+from jaxident.diagnosis.fit.prior import with_prior
 from jaxident.diagnosis.fit.refit import Data, Solution
 from jaxident.diagnosis.motion.linear import gram, left_over, normal, spread
 from jaxident.diagnosis.motion.responses import Responses
@@ -90,7 +90,7 @@ def _choose(data: Data, whitener: Array, solution: Solution, terms: list[Term], 
     linear, base = solution.linear, list(range(len(solution.places)))
     columns = np.concatenate([linear.slopes, answers, linear.residual[..., None]], axis=2)
     by_window = gram(whitener, columns, linear.starts).products
-    products = with_prior(by_window.sum(axis=0), solution.vector)
+    products = with_prior(by_window.sum(axis=0), solution.vector, data.windows)
     candidates = [len(base) + k for k in range(len(terms))]
     found = agreed(by_window, products, base, pursue(products, base, candidates, np.array([t.price for t in terms])))
     free = [*base, *(place for place, _ in found)]

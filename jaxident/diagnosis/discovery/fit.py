@@ -7,7 +7,7 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.diagnosis.discovery.candidates import Kind, columns_of, path_of
 from jaxident.diagnosis.discovery.curves import precision, solved
-from jaxident.diagnosis.fit.alike import unlikeliness, with_prior
+from jaxident.diagnosis.fit.prior import unlikeliness, with_prior
 from jaxident.diagnosis.fit.refit import Data, Solution, best_starts, covariance_from
 from jaxident.diagnosis.motion.linear import Gram, Linear, gram, linearise
 from jaxident.diagnosis.motion.responses import respond
@@ -94,7 +94,7 @@ def refit_with(data: Data, fit: Solution, curves: tuple[Curve, ...]) -> tuple[So
     low, high = (bound[fit.places] for bound in limits())
     smooth = smoothness(curves)
     starts, cost = best_starts(data, fit.vector, fit.starts, np.zeros_like(fit.starts), laws_from(curves))
-    cost = cost + unlikeliness(fit.vector) + _roughness(curves, smooth)
+    cost = cost + unlikeliness(fit.vector, data.windows) + _roughness(curves, smooth)
     now = fit._replace(starts=starts)
     around = _look(data, now, curves, smooth)
     for _ in range(MOST_STEPS):
@@ -111,7 +111,7 @@ def refit_with(data: Data, fit: Solution, curves: tuple[Curve, ...]) -> tuple[So
         around = _look(data, now, curves, smooth)
         if gained < ENOUGH:
             break
-    return _arrived(now._replace(linear=around.linear, cost=cost), curves, around)
+    return _arrived(data, now._replace(linear=around.linear, cost=cost), curves, around)
 
 
 def _look(data: Data, now: Solution, curves: tuple[Curve, ...], smooth: Array) -> _Around:
@@ -120,7 +120,7 @@ def _look(data: Data, now: Solution, curves: tuple[Curve, ...], smooth: Array) -
     columns = curve_columns(now._replace(linear=linear), data, curves)
     whole = np.concatenate([linear.slopes, columns, linear.residual[..., None]], axis=2)
     found = gram(data.whitener, whole, linear.starts)
-    summed, own = with_prior(found.products.sum(axis=0), now.vector), len(now.places)
+    summed, own = with_prior(found.products.sum(axis=0), now.vector, data.windows), len(now.places)
     summed[own:-1, own:-1] += smooth
     summed[own:-1, -1] -= smooth @ _values(curves)
     return _Around(linear, found, summed)
@@ -134,15 +134,15 @@ def _moved(data: Data, now: Solution, curves, around: _Around, step: Array, boun
     bent = _with_values(curves, _values(curves) + step[own:])
     moved = around.gram.solve[:, :, -1] - around.gram.solve[:, :, :-1] @ step
     starts, cost = best_starts(data, vector, now.starts, moved.T, laws_from(bent))
-    return vector, bent, starts, cost + unlikeliness(vector)
+    return vector, bent, starts, cost + unlikeliness(vector, data.windows)
 
 
 def _arrived(
-    fit: Solution, curves: tuple[Curve, ...], around: _Around
+    data: Data, fit: Solution, curves: tuple[Curve, ...], around: _Around
 ) -> tuple[Solution, tuple[Curve, ...], np.ndarray]:
     """The fit and its curves with their deviations, and the covariance of both."""
     own = len(fit.places)
-    covariance = covariance_from(around.summed, fit.places)
+    covariance = covariance_from(around.summed, fit.places, data.windows)
     spread = np.sqrt(np.maximum(np.diagonal(covariance)[own:], 0.0))
     pieces = np.split(spread, np.cumsum([len(curve.at) for curve in curves])[:-1])
     found = tuple(curve._replace(deviation=part) for curve, part in zip(curves, pieces, strict=True))

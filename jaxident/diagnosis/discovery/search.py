@@ -20,7 +20,7 @@ from jaxident.diagnosis.discovery.fit import (
     refit_with,
     smoothness,
 )
-from jaxident.diagnosis.fit.alike import with_prior
+from jaxident.diagnosis.fit.prior import with_prior
 from jaxident.diagnosis.fit.refit import Data, Solution
 from jaxident.diagnosis.motion.linear import without_starts
 from jaxident.diagnosis.motion.responses import respond
@@ -92,7 +92,7 @@ def _base(data: Data, fit: Solution, curves: tuple[Curve, ...]) -> tuple[np.ndar
     linear = fit.linear
     base = np.concatenate([linear.slopes, curve_columns(fit, data, curves), linear.residual[..., None]], axis=2)
     whitened, _ = without_starts(data.whitener, base, linear.starts)
-    own, prior = len(fit.places), with_prior(np.zeros((whitened.shape[2],) * 2), fit.vector)
+    own, prior = len(fit.places), with_prior(np.zeros((whitened.shape[2],) * 2), fit.vector, data.windows)
     smooth, values = smoothness(curves), np.concatenate([np.zeros(0), *(curve.value for curve in curves)])
     prior[own:-1, own:-1] += smooth
     prior[own:-1, -1] -= smooth @ values

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.fit.alike import GAINS, unlikeliness, with_prior
+from jaxident.diagnosis.fit.prior import GAINS, as_uncertain_as_prior, unlikeliness, with_prior
 from jaxident.diagnosis.motion.linear import Linear, follow, gram, linearise, normal
 from jaxident.diagnosis.motion.rims import Rims, rim_speeds
 from jaxident.diagnosis.motion.windows import Windows
@@ -83,7 +83,7 @@ def refit(data: Data, vector: Array, starts: Array, effects: tuple[str, ...], ho
         step = new_vector[places] - vector[places]
         moved = solve[:, :, -1] - solve[:, :, :-1] @ step
         new_starts, new_cost = best_starts(data, new_vector, starts, moved.T)
-        new_cost += unlikeliness(new_vector)
+        new_cost += unlikeliness(new_vector, data.windows)
         taken = new_cost < cost and not (speeds_up(new_vector) and not speeds_up(vector))
         there = _around(data, new_vector, new_starts, places) if taken else None
         if there is not None and np.all(np.isfinite(there[1])):  # beside a robot that runs away nothing can be told
@@ -96,7 +96,7 @@ def refit(data: Data, vector: Array, starts: Array, effects: tuple[str, ...], ho
             damping *= 10.0
             if damping > 1e6:
                 break
-    return Solution(vector, starts, places, linear, cost, covariance_from(products, places), step_number)
+    return Solution(vector, starts, places, linear, cost, covariance_from(products, places, data.windows), step_number)
 
 
 def speeds_up(vector: Array) -> bool:
@@ -130,7 +130,7 @@ def _around(data: Data, vector: Array, starts: Array, places: list[int]) -> tupl
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # a robot may run away
         more = None if linear.rims is None else data.of_rims(linear.rims, linear.rims.slopes, residual=True)
         found = gram(data.whitener, columns, linear.starts, more)
-    return linear, with_prior(found.products.sum(axis=0), vector), found.solve
+    return linear, with_prior(found.products.sum(axis=0), vector, data.windows), found.solve
 
 
 def best_starts(
@@ -186,13 +186,13 @@ def _step(products: Array, now: Array, low: Array, high: Array, damping: float) 
     return step, float(step @ products[:-1, -1] - 0.5 * step @ products[:-1, :-1] @ step)
 
 
-def covariance_from(products: Array, places: list[int]) -> np.ndarray:
+def covariance_from(products: Array, places: list[int], windows: Windows) -> np.ndarray:
     """Covariance of the free coordinates in `places`, and of what products (n, n) have behind them. No coordinate is
     less certain than WIDE of its sizes: what the runs say nothing of would else have a deviation of 1e90, and a
-    prediction with it."""
+    prediction with it. What the prior holds is as uncertain as the prior."""
     whole, own = np.array(products[:-1, :-1]), np.arange(len(places))
     whole[own, own] += (WIDE * sizes()[places]) ** -2.0
     scale = np.sqrt(np.diagonal(whole))
     values, vectors = np.linalg.eigh(whole / scale[:, None] / scale)
     rows = vectors / np.sqrt(np.maximum(values, 1e-12))
-    return rows @ rows.T / scale[:, None] / scale
+    return as_uncertain_as_prior(rows @ rows.T / scale[:, None] / scale, windows)

@@ -20,7 +20,7 @@ class Windows(NamedTuple):
     command (rows of a piece, pieces, 2). step (rows, windows) [s]: from each row to the next; pose (rows, windows, 3);
     seen (rows, windows); run (windows,): of which piece; first (windows,): its first row there; row (windows,): in
     the log. wheels (rows, windows, 2) [rad/s], turning (rows, windows): wheel speeds, and where both were measured;
-    None in logs without.
+    None in logs without. held (2,): whether a speed's rate is the prior's (`fit.prior`), not the windows'.
     """
 
     t: Any
@@ -34,6 +34,7 @@ class Windows(NamedTuple):
     row: Any
     wheels: Any = None
     turning: Any = None
+    held: Any = (False, False)
 
 
 class Piece(NamedTuple):

@@ -13,6 +13,8 @@ from jaxident.robot.model import Model, require_physical
 
 STEP = 1e-4
 """Part of a parameter's size, or of its deviation if that is smaller, by which a robot is moved."""
+NOTHING = 1e-6
+"""Below which a parameter says nothing of its size, in its own unit."""
 
 
 def directions(model: Model) -> list[tuple[Model, float]]:
@@ -40,13 +42,15 @@ def _roots(covariance: Array) -> np.ndarray:
 
 def _sizes(names: list[str], values: Array) -> np.ndarray:
     """Typical sizes (n,) of parameters: their own, or where they are next to nothing that of the largest of their kind,
-    of an effect that of a clear case. Values of a discovered law are of one kind.
+    of an effect that of a clear case. Values of a discovered law are of one kind. A kind that is next to nothing has no
+    size (infinite): a step is then a part of the deviation.
 
-    A drag at its bound of 0 once made steps of 1e-9. The filter's own differences are good to some 1e-9 m, so that the
-    predicted deviations came out as 23 m."""
+    A drag at its bound of 0 once made steps of 1e-9, two dead zones of 0 made some of 1e-10. The filter's own
+    differences are good to some 1e-9 m, so that the predicted deviations came out as 23 m, or 7e7 m."""
     kinds = [name if name.count(".") == 1 else name.replace(".", "_").rsplit("_", 1)[0] for name in names]
     largest = {kind: max(abs(v) for k, v in zip(kinds, values, strict=True) if k == kind) for kind in kinds}
-    return np.array([max(largest[kind], _clear(kind), 1e-6) for kind in kinds])
+    sizes = np.array([max(largest[kind], _clear(kind)) for kind in kinds])
+    return np.where(sizes > NOTHING, sizes, np.inf)
 
 
 def _clear(kind: str) -> float:

@@ -8,7 +8,7 @@ from jaxident.array_types import Array
 from jaxident.errors import InputError
 from jaxident.estimation.poses.maximum_likelihood import Beginning, Fit, begin, fit_from, numbers_in
 from jaxident.estimation.poses.parameters import Law, names
-from jaxident.estimation.poses.prior import RATE, RATE_SPREAD, SIGNS, Prior, middle_gain, prior_of
+from jaxident.estimation.poses.prior import RATE, SIGNS, SLOWEST_ROBOT, Prior, middle_gain, prior_of
 from jaxident.estimation.poses.residual_tests import whiteness
 from jaxident.estimation.poses.runs import Runs
 
@@ -22,7 +22,6 @@ NOISE_LAWS = {
 
 ROUNDING = 1e-8
 """Camera errors [m], [rad] below this are none: what is left of data without noise is rounding, and never white."""
-NORMAL_HALF = 1.96
 CLEAR = 3.0
 """Standard deviations from zero from which on a gain has a sign."""
 AS_LIKELY = 1.0
@@ -98,7 +97,7 @@ def coasts(fit: Fit, runs: Runs) -> np.ndarray:
     deviation = np.sqrt(np.diagonal(np.asarray(fit.covariance))[2:6]).reshape(2, 2)
     time = np.cumsum(np.broadcast_to(np.asarray(runs.step), runs.seen.shape), axis=1)
     longest = float(np.max(np.where(np.asarray(runs.seen), time, 0.0)))
-    slow = (rate < RATE * np.exp(-NORMAL_HALF * RATE_SPREAD)) & (rate * longest < 1.0)
+    slow = (rate < SLOWEST_ROBOT) & (rate * longest < 1.0)
     driven = np.all(np.array(SIGNS) * gain > CLEAR * deviation, axis=1)
     return slow & (~driven | (colour(fit, runs) >= WHITE))
 

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jaxident.array_types import Array, Column, Gains, Rows, Square, Unknowns, UnknownsMatrix
 from jaxident.estimation.poses.parameters import Law, is_logarithmic, names
@@ -24,6 +25,8 @@ from jaxident.numerics import safe_divide, sin_cos, wrap
 
 RATE, RATE_SPREAD = 3.0, 1.175
 """Middle of the rates [1/s], and the deviation of their logarithm."""
+SLOWEST_ROBOT = float(RATE * np.exp(-1.96 * RATE_SPREAD))
+"""The rate [1/s] below which one robot in forty answers."""
 SPEED = 1.5
 """Steady speed at the largest command of one wheel, over S."""
 HALF_TRACK = 0.25

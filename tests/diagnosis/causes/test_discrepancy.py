@@ -9,7 +9,7 @@ from support.small_robot import LAW, VECTOR, nominal_fit, windows_of
 
 from jaxident.diagnosis.causes import discrepancy
 from jaxident.diagnosis.causes.discrepancy_basis import Term, library, pursue
-from jaxident.diagnosis.fit.alike import departures
+from jaxident.diagnosis.fit.prior import departures
 from jaxident.diagnosis.fit.refit import Data
 from jaxident.diagnosis.motion.linear import Linear
 from jaxident.diagnosis.motion.responses import answer_to_start, respond
@@ -40,7 +40,7 @@ def made():
 def dense(law, solution, data, responses):
     """Restricted log-likelihood up to a constant: start states free in every window, coordinates under their prior."""
     linear, total = solution.linear, covariance(law, data.windows, responses)
-    away, slopes = departures(VECTOR)
+    away, slopes = departures(VECTOR, data.windows)
     prior = np.column_stack([slopes, -away])
     volume, squares = 0.0, prior.T @ prior
     for k in range(COUNT):

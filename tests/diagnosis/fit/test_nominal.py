@@ -1,14 +1,17 @@
 """The nominal fit that a search begins from: it does not stay in a wrong valley."""
 
+from types import SimpleNamespace
+
 import jax
 import numpy as np
 import pytest
 
-from jaxident.diagnosis.fit.nominal import first_starts, lower_valley, rough_fit, steady_point
+from jaxident.diagnosis.fit.nominal import coasts, first_starts, hold_rates, lower_valley, rough_fit, steady_point
 from jaxident.diagnosis.fit.refit import Data, refit
 from jaxident.diagnosis.motion.windows import cut
 from jaxident.diagnosis.noise.law import Law, white_whitener
 from jaxident.effects.coordinates import neutral_vector, nominal_vector
+from jaxident.estimation.poses.prior import RATE, RATE_SPREAD
 from jaxident.log import Log, join
 from jaxident.robot.drive import Physical
 from jaxident.robot.model import Model
@@ -52,3 +55,42 @@ def test_a_fit_in_a_wrong_valley_gives_way_to_a_lower_one():
     assert np.exp(found.vector[:2]) == pytest.approx(DRIVE.rate, rel=0.02)
     assert found.vector[2:6] == pytest.approx(np.ravel(DRIVE.gain), rel=0.1)
     assert lower_valley(right, windows) is right
+
+
+def fit_with(rates, gain, deviation=0.01):
+    vector = neutral_vector(np.concatenate([np.log(rates), np.ravel(gain), np.zeros(4)]))
+    return SimpleNamespace(vector=vector, covariance=np.eye(10) * deviation**2)
+
+
+@pytest.mark.parametrize(
+    ("rates", "gain", "unexplained", "expected"),
+    [
+        ([0.05, 5.0], [[0.5, 0.4], [9.0, -8.5]], True, [True, False]),
+        ([0.05, 5.0], [[0.5, 0.4], [9.0, -8.5]], False, [False, False]),  # slow, but it answers, and nothing is missing
+        ([0.05, 0.1], [[0.5, -0.4], [9.0, -8.5]], False, [True, False]),  # one wheel drives backwards
+        ([0.05, 0.1], [[0.02, 0.4], [0.01, 0.02]], False, [True, True]),  # gains without a sign
+        ([0.4, 5.0], [[0.5, 0.4], [9.0, -8.5]], True, [False, False]),
+    ],
+)
+def test_a_robot_that_coasts_is_told_from_a_slow_one(rates, gain, unexplained, expected):
+    windows = windows_of(25)
+    assert coasts(fit_with(rates, gain), windows, unexplained).tolist() == expected
+    beside_wheels = windows._replace(wheels=np.zeros((*windows.seen.shape, 2)))
+    assert not coasts(fit_with(rates, gain), beside_wheels, unexplained).any()
+
+
+def test_a_rate_that_is_held_is_the_priors_and_as_uncertain():
+    """The other speed is fitted as before: this robot's rates are 3 and 5 1/s, and the prior's is 3 by chance."""
+    free = windows_of(25)
+    data = Data(free, white_whitener(LAW, free))
+    found = refit(data, neutral_vector(steady_point(free)), first_starts(free), ())
+    windows, _ = hold_rates(free, np.array([False, True]))
+    assert windows.held == (False, True)
+    held = refit(data._replace(windows=windows), found.vector, found.starts, (), most=60)
+    assert np.exp(held.vector[1]) == pytest.approx(RATE, rel=1e-4)
+    assert held.vector[8:10] == pytest.approx([0.0, 0.0], abs=1e-4)
+    assert np.sqrt(held.covariance[1, 1]) == pytest.approx(RATE_SPREAD)
+    steady, slower = (fit.vector[4:6] / np.exp(fit.vector[1]) for fit in (found, held))
+    assert slower == pytest.approx(steady, rel=0.1), "the steady turn rate is told whatever the rate"
+    across = held.covariance[1, 4:6] / held.covariance[1, 1]
+    assert across == pytest.approx(held.vector[4:6], rel=0.2), "a faster robot has larger gains"

@@ -90,3 +90,12 @@ def test_a_parameter_at_its_bound_is_moved_by_a_fair_step():
         other = with_values(bare, {name: parameter_values(model)[name] + 0.1 * deviation})
         moved = 10.0 * (run_ahead(other, log, starts, 30, burn_in=20, session_time=0.0).pose[0, -1] - here)
         assert np.min(np.linalg.norm(np.abs(told) - np.abs(moved), axis=1)) < 0.15 * np.linalg.norm(moved)
+
+
+def test_parameters_of_nothing_are_moved_by_a_part_of_their_deviation():
+    """Steps of 1e-10 in dead zones of 0 drowned in rounding: predicted deviations were 7e7 m."""
+    order, deviation = ("rate_1", "dead_zone_r", "dead_zone_l"), np.array([0.3, 0.5, 0.4])
+    model = dataclasses.replace(uncertain(), dead_zone=np.zeros(2), effects=(), discovered=(), parameter_order=order,
+                                covariance=np.diag(deviation**2))  # fmt: skip
+    moved = [max(other.dead_zone) for other, _ in directions(model) if np.any(other.dead_zone != 0.0)]
+    np.testing.assert_allclose(sorted(moved), 1e-4 * np.sort(deviation[1:]))
