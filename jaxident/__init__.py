@@ -48,6 +48,7 @@ _HOMES = {
     "save_model": "jaxident.files.models",
     "read_study": "jaxident.files.studies",
     "summarise": "jaxident.study.statistics",
+    "naming": "jaxident.study.naming",
     "Study": "jaxident.study.design",
 }
 _ROOMS = {

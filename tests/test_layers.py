@@ -16,7 +16,8 @@ FLOORS = (
     ("robot",),
     ("effects",),
     ("estimation",),
-    ("study", "diagnosis"),
+    ("diagnosis",),
+    ("study",),
     ("files", "plot", "report", "export"),
     ("results",),
     ("entry",),
@@ -32,7 +33,7 @@ ROWS = {
 }
 """Inner rooms of a room, in the order in which data walk through them; its own files stand behind them all."""
 FLOOR_OF = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
-UPSTAIRS = 5
+UPSTAIRS = 6
 """The lowest floor that may print and draw."""
 
 FILE_LINES, FUNCTION_LINES = 250, 40

@@ -21,7 +21,9 @@ def command(study, out, scheduler, trial, example, seed):
     """Run a Monte-Carlo study: every combination of the file's axes, with many seeds.
 
     It writes DIR/trials.zarr (every trial; xarray.open_zarr opens it), DIR/summary.csv with bias, error and coverage,
-    and DIR/index.html. If it is stopped at any moment, the same command goes on and ends with the same numbers.
+    and DIR/index.html. With the estimator `diagnose`, which takes seconds a trial, it also writes what was named:
+    DIR/naming.csv and DIR/named_effects.csv. If it is stopped at any moment, the same command goes on and ends with
+    the same numbers.
 
     Example: jaxident sweep --example > study.toml, then jaxident sweep study.toml --out study
     """
@@ -43,11 +45,12 @@ def command(study, out, scheduler, trial, example, seed):
 
 
 def _run_all(plan, out, scheduler):
-    from jaxident.files.summary import write_summary
+    from jaxident.files.summary import write_naming, write_summary
     from jaxident.files.sweeps import Told, sweep
     from jaxident.files.trials import open_trials
     from jaxident.report.sweep import write_study
     from jaxident.study.bound import bounds
+    from jaxident.study.naming import naming
     from jaxident.study.statistics import summarise
 
     def damaged(count):
@@ -60,7 +63,10 @@ def _run_all(plan, out, scheduler):
         trials = open_trials(path)
         summary = summarise(trials, bounds(plan))
         paths = [write_summary(summary, os.path.join(out, "summary.csv"))]
-        paths += write_study(plan, trials, summary, os.path.join(out, "index.html"))
+        named = naming(trials)
+        if named is not None:
+            paths += write_naming(named, os.path.join(out, "naming.csv"), os.path.join(out, "named_effects.csv"))
+        paths += write_study(plan, trials, summary, os.path.join(out, "index.html"), named)
     for name in paths:
         wrote(name)
     tell_origin(paths[0], origin("summary.csv"))

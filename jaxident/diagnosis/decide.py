@@ -10,6 +10,7 @@ from jaxident.diagnosis.preparation import translate
 from jaxident.diagnosis.preparation.prepare import Prepared
 from jaxident.effects.coordinates import ASIDE, PLACES
 
+VERDICTS = ("no_gap", "parameters", "effects", "partly", "unknown", "undecided")
 FEW, FEWEST = 6, 2
 """Windows that naming and judging need before anything is claimed."""
 DIFFERENT = 4.0

@@ -3,6 +3,7 @@
 import csv
 import itertools
 import os
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,8 @@ from jaxident.study.statistics import cell_axes
 NUMBERS = ("truth", "trials", "failed", "bias", "bias_se", "sd", "sd_se", "rmse", "rmse_se", "coverage", "coverage_se")
 """Columns after the axes of the cells (`effect` where the study has it), estimator and parameter; then come q05 and so
 on, the quantiles of the error, and rmse_over_bound where there is a bound."""
+OF_CELL, OF_EFFECT = ("all_named", "right", "claimed", "false_names"), ("share_named", "takes_part")
+"""Numbers of `study.naming`, each followed by its standard error."""
 
 
 def write_summary(summary: xarray.Dataset, path: Target) -> str:
@@ -33,6 +36,34 @@ def write_summary(summary: xarray.Dataset, path: Target) -> str:
             rest = [*shares[row], *(order[name][row] for name in bounded)]
             table.writerow([*map(_text, key), *map(_text, numbers), *map(_text, rest)])
     return os.fspath(path)
+
+
+def write_naming(named: xarray.Dataset, cells: Target, effects: Target) -> list[str]:
+    """Write what diagnoses name as two tables: one row for each cell and diagnosis, and one for each effect of the
+    catalogue that acts or is named there. Returns the paths."""
+    keys = (*cell_axes(named), "estimator")
+    whole = ("diagnosed", *_with_errors(OF_CELL))
+    of_effect = ("in_force", "diagnosed", *_with_errors(OF_EFFECT))
+    every = named.assign({name: named[name].broadcast_like(named["share_named"]) for name in ("in_force", "diagnosed")})
+    worth = every["in_force"] | (every["share_named"] > 0.0)
+    _write_rows(named, keys, whole, cells, lambda at: True)
+    _write_rows(every, (*keys, "catalogue"), of_effect, effects, lambda at: bool(worth.sel(at)))
+    return [os.fspath(cells), os.fspath(effects)]
+
+
+def _with_errors(names: tuple[str, ...]) -> list[str]:
+    return [each for name in names for each in (name, f"{name}_se")]
+
+
+def _write_rows(table: xarray.Dataset, keys, columns, path: Target, kept: Callable[[dict[str, Any]], bool]) -> None:
+    """Rows of a dataset by the entries of some axes, those that are kept."""
+    values = {name: table[name].transpose(*keys).values.ravel() for name in columns}
+    with writing_text(path) as stream:
+        out = csv.writer(stream, lineterminator="\n")
+        out.writerow(["named_effect" if key == "catalogue" else key for key in keys] + list(columns))
+        for row, key in enumerate(itertools.product(*(table[key].values for key in keys))):
+            if kept(dict(zip(keys, key, strict=True))):
+                out.writerow([*map(_text, key), *(_text(values[name][row]) for name in columns)])
 
 
 def _text(value: Any) -> str:

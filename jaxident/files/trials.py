@@ -25,7 +25,7 @@ import zarr
 from jaxident.errors import InputError, WorkError
 from jaxident.files.atomic import Target, explained, make_folder, write_text
 from jaxident.files.json_text import format_json, read_json
-from jaxident.study.dataset import FURTHER_AXES, attributes, coordinates, describe, layout, versions
+from jaxident.study.dataset import attributes, coordinates, describe, further_axes, layout, versions
 from jaxident.study.design import Study
 from jaxident.study.engine import Piece, chunk_shape, chunks
 from jaxident.study.trial import Outcome
@@ -79,10 +79,10 @@ def write_chunk(store: Store, number: int, outcome: Outcome) -> None:
     """Put a chunk in its place, then its checksums. WorkError where the disk is full: what was there stays."""
     with explained(store.folder, KEPT):
         group = zarr.open_group(store.folder / UNDER_WAY, mode="r+", zarr_format=2, use_consolidated=False)
-        for name, part in outcome._asdict().items():
+        for name in further_axes(store.study):
             array: Any = group[name]
             cut = store.pieces[number].cut
-            array[cut + (slice(None),) * (array.ndim - len(cut))] = part
+            array[cut + (slice(None),) * (array.ndim - len(cut))] = getattr(outcome, name)
         text = _checksums(store, number)
     write_text(_marker(store, number), text)
 
@@ -178,7 +178,7 @@ def _write_skeleton(study: Study, path: pathlib.Path) -> None:
             chunks=chunk_shape(study) + shape[len(study.axes) :],
             dtype=kind,
             fill_value=None if kind.kind == "i" else float("nan"),
-            attributes={"_ARRAY_DIMENSIONS": [*study.axes, *FURTHER_AXES[name]], **attributes(name)},
+            attributes={"_ARRAY_DIMENSIONS": [*study.axes, *further_axes(study)[name]], **attributes(name)},
             config={"write_empty_chunks": True},
         )
     zarr.consolidate_metadata(path, zarr_format=2)
@@ -193,7 +193,7 @@ def _checksums(store: Store, number: int) -> str:
     sums: dict[str, str | None] = {}
     size = chunk_shape(store.study)
     index = [part.start // length for part, length in zip(store.pieces[number].cut, size, strict=True)]
-    for name, further in FURTHER_AXES.items():
+    for name, further in further_axes(store.study).items():
         key = ".".join(map(str, index + [0] * len(further)))
         path = store.folder / UNDER_WAY / name / key
         sums[name] = hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else None

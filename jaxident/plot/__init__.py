@@ -35,6 +35,8 @@ _HOMES = {
     "heat_map": "studies",
     "error_curves": "studies",
     "error_histogram": "studies",
+    "name_matrix": "naming",
+    "share_curves": "naming",
     "figure": "style",
     "new_axes": "style",
     "legend_above": "style",

@@ -3,17 +3,18 @@
 import json
 import math
 import os
-from typing import Any
 
 import numpy as np
 import xarray
 
 from jaxident import plot
 from jaxident.files.atomic import Target
-from jaxident.plot.names import plain, written
+from jaxident.plot.names import plain
 from jaxident.plot.studies import Curve
 from jaxident.report.glossary import glossary
+from jaxident.report.naming import naming_lead, naming_sections
 from jaxident.report.page import PHONE, Figure, Page, Section, Table, write_page
+from jaxident.report.sweep_maps import MAP_TEXT, entry, maps
 from jaxident.report.words import number
 from jaxident.robot.model import DIFFERENCE_ORDER, require_physical
 from jaxident.study.design import Study
@@ -26,24 +27,28 @@ LISTED = 60
 """Rows that a table of the page shows; the rest stands in summary.csv."""
 
 
-def write_study(study: Study, trials: xarray.Dataset, summary: xarray.Dataset, path: Target) -> list[str]:
-    """Write the page of a study; returns its path. Of the trials it reads one cell."""
-    write_page(_page(study, trials, summary), path)
+def write_study(
+    study: Study, trials: xarray.Dataset, summary: xarray.Dataset, path: Target, named: xarray.Dataset | None = None
+) -> list[str]:
+    """Write the page of a study, with what diagnoses `named`, if any; returns its path. Of the trials it reads one
+    cell."""
+    write_page(_page(study, trials, summary, named), path)
     return [os.fspath(path)]
 
 
-def _page(study: Study, trials: xarray.Dataset, summary: xarray.Dataset) -> Page:
+def _page(study: Study, trials: xarray.Dataset, summary: xarray.Dataset, named: xarray.Dataset | None) -> Page:
     base = {axis: 0 for axis in cell_axes(summary) if axis != "noise"}
     sections = [
+        *naming_sections(named),
         Section("Failures and break-down", [_breakdown_text(), _breakdown_table(summary)]),
         Section("Error against noise", [_where(summary, base), *(_curves(summary, base, name) for name in SHOWN)]),
-        Section("Maps", [_map_text(), *_maps(summary, base)]),
+        Section("Maps", [MAP_TEXT, *maps(summary, base)]),
         Section("Distributions", [_histogram(study, trials, summary, name) for name in SHOWN]),
         Section("All numbers", [_numbers(summary.isel(base))], folded=True),
         glossary("bias", "coverage", "interval", "Monte-Carlo error", "root mean square"),
     ]
     versions = ", ".join(f"{name} {found}" for name, found in json.loads(trials.attrs["versions"]).items())
-    lead = f"{_finding(summary)} {_counts(study, summary)}"
+    lead = f"{naming_lead(named)}{_finding(summary)} {_counts(study, summary)}"
     closing = f"Seed {study.seed}; {versions}."
     return Page(study.name, lead, sections, closing, what_next(study, summary), _break_down(summary))
 
@@ -143,19 +148,14 @@ def _breakdown_table(summary: xarray.Dataset) -> Table:
         value = float(level[at])
         told_level = "none of these" if math.isnan(value) else f"{1e3 * value:.4g} mm"
         counts = [int(failures.isel(at).sel(reason=name)) for name in reasons]
-        rows.append((*(_entry(summary, axis, at[axis]) for axis in told), told_level, *counts))
+        rows.append((*(entry(summary, axis, at[axis]) for axis in told), told_level, *counts))
     more = f" The first {LISTED} of {level.size}." if level.size > LISTED else ""
     return Table((*told, "broken from", *reasons), rows, f"Lowest camera noise that breaks the estimator.{more}")
 
 
-def _entry(summary: xarray.Dataset, axis: str, index: int) -> str:
-    value = summary[axis].values[index]
-    return value if isinstance(value, str) else f"{value:.4g}"
-
-
 def _where(summary: xarray.Dataset, at: dict[str, int]) -> str:
     """Which cell is shown, of the axes that have several."""
-    told = [f"{axis} {_entry(summary, axis, k)}" for axis, k in at.items() if summary.sizes[axis] > 1]
+    told = [f"{axis} {entry(summary, axis, k)}" for axis, k in at.items() if summary.sizes[axis] > 1]
     return f"Shown for {', '.join(told)}; summary.csv has all." if told else "Over all seeds."
 
 
@@ -171,48 +171,6 @@ def _curves(summary: xarray.Dataset, at: dict[str, int], name: str) -> Figure:
     figure, ax = plot.figure(size=(PHONE, 3.4))
     plot.error_curves(summary["noise"].values, curves, label=name, ax=ax, bound=bound)
     return Figure(plot.image(figure), f"Error of {name} against camera noise")
-
-
-def _map_text() -> str:
-    return (
-        "Root-mean-square error in per cent of the parameter's true value; numbers below a map are camera noise [mm]."
-    )
-
-
-def _maps(summary: xarray.Dataset, base: dict[str, int]) -> list[Figure]:
-    """For each estimator parameters over noise, and each further axis over noise for the median parameter."""
-    share = 100.0 * summary["rmse"] / np.abs(summary["truth"])
-    noise = [f"{1e3 * level:.3g}" for level in summary["noise"].values]
-    made = []
-    for one in map(str, summary["estimator"].values):
-        cell = share.sel(estimator=one)
-        names = [written(name).symbol for name in DIFFERENCE_ORDER]
-        made.append(_map(cell.isel(base).transpose("parameter", "noise").values, names, noise, f"{one}: error [%]"))
-        for axis in (axis for axis in base if summary.sizes[axis] > 1):
-            rest = {key: k for key, k in base.items() if key != axis}
-            middle = cell.isel(rest).median("parameter", skipna=False).transpose(axis, "noise").values
-            labels = [plain(_entry(summary, axis, k)) for k in range(summary.sizes[axis])]
-            made.append(_map(middle, labels, noise, f"{one}: error of the median parameter [%], by {axis}"))
-        if "effect" in base:
-            made.append(_effect_map(cell, base, one))
-    return made
-
-
-def _effect_map(share: xarray.DataArray, base: dict[str, int], estimator: str) -> Figure:
-    """Errors [%] of an estimator by set of effects and parameter, at the middle noise level."""
-    middle = share.sizes["noise"] // 2
-    rest = {key: k for key, k in (base | {"noise": middle}).items() if key != "effect"}
-    values = share.isel(rest).transpose("effect", "parameter").values
-    symbols = [written(name).symbol for name in DIFFERENCE_ORDER]
-    level = f"{1e3 * float(share['noise'][middle]):.3g} mm of camera noise"
-    sets = list(map(plain, share["effect"].values))
-    return _map(values, sets, symbols, f"{estimator}: error [%] by effect, at {level}")
-
-
-def _map(values: Any, rows: list[str], columns: list[str], label: str) -> Figure:
-    figure, ax = plot.figure(size=(6.3, 0.6 + 0.27 * max(len(rows), 2)))
-    plot.heat_map(values, rows=rows, columns=columns, label=plain(label), ax=ax)
-    return Figure(plot.image(figure), label)
 
 
 def _histogram(study: Study, trials: xarray.Dataset, summary: xarray.Dataset, name: str) -> Figure:

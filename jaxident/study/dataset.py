@@ -3,20 +3,21 @@
 import json
 import math
 import platform
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import jax
 import numpy as np
 import xarray
 
+from jaxident.diagnosis.decide import VERDICTS
+from jaxident.effects.catalogue import CATALOGUE
 from jaxident.origin import versions as of_packages
 from jaxident.robot.model import DIFFERENCE_ORDER, Discovered, Effect
 from jaxident.study.design import PARTS, Study, check_study
 from jaxident.study.engine import chunks, run_locally
 from jaxident.study.estimators import settings_of
 from jaxident.study.sight import REASONS
-from jaxident.study.trial import Outcome
 
 FURTHER_AXES = {
     "estimate": ("estimator", "parameter"),
@@ -25,6 +26,14 @@ FURTHER_AXES = {
     "reason": ("estimator",),
 }
 """The variables of a study, fields of `Outcome`, and their axes after those of the trials."""
+OF_DIAGNOSES = {
+    "verdict": ("estimator",),
+    "takes_part": ("estimator", "catalogue"),
+    "named": ("estimator", "catalogue"),
+}
+"""Those that only studies with diagnoses have."""
+_SMALL = ("reason", "verdict")
+"""Variables that are an index."""
 
 _MEANING: dict[str, dict[str, Any]] = {
     "estimate": {"long_name": "estimated parameter, NaN where the estimator failed"},
@@ -35,6 +44,13 @@ _MEANING: dict[str, dict[str, Any]] = {
         "flag_values": list(range(len(REASONS))),
         "flag_meanings": "; ".join(REASONS),
     },
+    "verdict": {
+        "long_name": "verdict of the diagnosis, -1 where the estimator gives none",
+        "flag_values": list(range(len(VERDICTS))),
+        "flag_meanings": " ".join(VERDICTS),
+    },
+    "takes_part": {"long_name": "probability that the effect takes part, NaN where the estimator gives none"},
+    "named": {"long_name": "1 where the diagnosis names the effect, NaN where the estimator names none"},
 }
 _UNITS = {"alpha": "1", "dead_zone": "unit", "1": "m/unit", "2": "rad/unit"}
 
@@ -46,20 +62,26 @@ def study_arrays(study: Study, advance: Callable[[int], None] = lambda trials: N
     arrays = {name: np.empty(shape, kind) for name, (shape, kind) in layout(study).items()}
     cut = chunks(study)
     for number, outcome in run_locally(study, range(len(cut))):
-        for name, part in outcome._asdict().items():
-            arrays[name][cut[number].cut] = part
+        for name, array in arrays.items():
+            array[cut[number].cut] = getattr(outcome, name)
         advance(math.prod(cut[number].shape))
     axes = study.axes
-    made = xarray.Dataset({name: (axes + FURTHER_AXES[name], array, _MEANING[name]) for name, array in arrays.items()})
+    further = further_axes(study)
+    made = xarray.Dataset({name: (axes + further[name], array, _MEANING[name]) for name, array in arrays.items()})
     return made.assign_coords(coordinates(study).coords).assign_attrs(coordinates(study).attrs)
+
+
+def further_axes(study: Study) -> dict[str, tuple[str, ...]]:
+    """The variables of a study and their axes after those of the trials."""
+    return FURTHER_AXES | (OF_DIAGNOSES if study.diagnoses else {})
 
 
 def layout(study: Study) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
     """Shape and type of each variable."""
-    further = {"estimator": len(study.estimators), "parameter": len(DIFFERENCE_ORDER)}
+    further = {"estimator": len(study.estimators), "parameter": len(DIFFERENCE_ORDER), "catalogue": len(CATALOGUE)}
     return {
-        name: (study.shape + tuple(further[axis] for axis in axes), np.dtype("i1" if name == "reason" else "f8"))
-        for name, axes in FURTHER_AXES.items()
+        name: (study.shape + tuple(further[axis] for axis in axes), np.dtype("i1" if name in _SMALL else "f8"))
+        for name, axes in further_axes(study).items()
     }
 
 
@@ -88,6 +110,8 @@ def coordinates(study: Study) -> xarray.Dataset:
         "parameter": ("parameter", list(DIFFERENCE_ORDER), {"long_name": "as in a model file"}),
         "unit": ("parameter", [_unit(name) for name in DIFFERENCE_ORDER], {}),
     }
+    if study.diagnoses:
+        entries["catalogue"] = ("catalogue", list(CATALOGUE), {"long_name": "effects that a diagnosis may name"})
     if study.effects:
         entries["effect"] = ("effect", [one.name for one in study.effects], {"long_name": "effects added to the robot"})
     return xarray.Dataset(coords=entries, attrs=provenance(study))
@@ -144,8 +168,3 @@ def _sizes(effects: Sequence[Effect]) -> dict[str, dict[str, float]]:
 def _unit(parameter: str) -> str:
     kind, _, index = parameter.rpartition("_")
     return _UNITS[kind] if kind in _UNITS else _UNITS[index[0]]
-
-
-def outcome_of(trials: Mapping[str, Any], cut: tuple[Any, ...]) -> Outcome:
-    """A part of a study's arrays, read now."""
-    return Outcome(*(np.asarray(trials[name].variable[cut]) for name in Outcome._fields))

@@ -10,7 +10,7 @@ from jaxident.effects.discovered import check_discovered
 from jaxident.errors import InputError
 from jaxident.robot.excitation import EXCITATIONS
 from jaxident.robot.model import Effect, Model, require_physical
-from jaxident.study.estimators import check_choice
+from jaxident.study.estimators import DIAGNOSE, check_choice
 from jaxident.study.sight import Choice
 
 AXES = ("excitation", "samples", "robot", "effect", "period", "amplitude", "noise", "seed")
@@ -107,6 +107,11 @@ class Study(NamedTuple):
     def effect_names(self) -> frozenset[str]:
         """Names of the effects that are in force in any trial."""
         return frozenset(effect.name for robot in self.in_force for effects in robot for effect in effects)
+
+    @property
+    def diagnoses(self) -> tuple[int, ...]:
+        """Places of the estimators that are diagnoses."""
+        return tuple(k for k, choice in enumerate(self.estimators) if choice.method == DIAGNOSE)
 
     @property
     def trials(self) -> int:

@@ -18,11 +18,15 @@ from jaxident.robot.excitation import EXCITATIONS
 from jaxident.robot.model import Model, require_physical
 from jaxident.robot.wheel_sensor import WheelSensor
 from jaxident.study.design import PARTS, Study
+from jaxident.study.diagnosed import with_diagnoses
 from jaxident.study.estimators import runs_alone
 from jaxident.study.trial import Cell, Outcome, Plan, Recording, Robot, commands, record, run_trial
 
 BLOCK = 50
 """Trials at once on a CPU: so few that their work stays in the cache."""
+
+DIAGNOSED_AT_ONCE = 4
+"""Trials of a chunk where they are diagnosed, about a minute's work: a study that is stopped loses its last chunk."""
 
 TRIAL_BYTES, ROW_BYTES = 1e6, 4e3
 """What a graphics card is given for a trial of one estimator, and for each of its rows: on an H200 a whole trial of the
@@ -32,6 +36,7 @@ STATIC = ("excitation", "samples")
 """Axes that the compiled program is fixed to: no chunk spans two of their entries."""
 
 _KINDS = tuple(EXCITATIONS)
+_record = jax.jit(record, static_argnames="effects")
 
 
 class Piece(NamedTuple):
@@ -48,7 +53,7 @@ class Piece(NamedTuple):
 def chunk_shape(study: Study) -> tuple[int, ...]:
     """Lengths of a chunk on the study's axes: whole axes from the last one on, as long as its trials are not more than
     `study.chunk`."""
-    room, shape = study.chunk, []
+    room, shape = min(study.chunk, DIAGNOSED_AT_ONCE) if study.diagnoses else study.chunk, []
     for axis, length in zip(reversed(study.axes), reversed(study.shape), strict=True):
         size = 1 if axis in STATIC else max(1, min(length, room))
         room = room // size if size == length else 1
@@ -78,22 +83,19 @@ def run_chunk(study: Study, piece: Piece, cores: int | None = None) -> Outcome:
     """
     require_float64("study")
     index = np.indices(piece.shape).reshape(len(piece.shape), -1) + np.array([[part.start] for part in piece.cut])
-    outcome = _run(study, index, cores)
-    return Outcome(*(part.reshape(*piece.shape, *part.shape[1:]) for part in outcome))
+    outcome = with_diagnoses(study, _run(study, index, cores), lambda trial: _recording(study, index[:, trial]))
+    return jax.tree.map(lambda part: part.reshape(*piece.shape, *part.shape[1:]), outcome)
 
 
 def run_one(study: Study, number: int) -> tuple[Recording, Outcome]:
     """Trial `number`, counted along the study's axes with the last fastest, alone: its recording, and its outcome,
     which is bit by bit that in the whole study."""
     require_float64("study")
-    index = np.array(np.unravel_index(number, study.shape))[:, None]
-    cell = jax.tree.map(lambda leaf: leaf[0], cells(study, index))
-    command = Wheels(*(u[0] for u in _commands(study, index, cells(study, index))))
-    outcome = _run(study, np.repeat(index, block_size(study), axis=1), 1)
-    recording = jax.jit(record, static_argnames="effects")(
-        jax.random.key(study.seed), cell, command, study.effect_names
-    )
-    return jax.tree.map(np.asarray, recording), Outcome(*(part[0] for part in outcome))
+    index = np.array(np.unravel_index(number, study.shape))
+    recording = _recording(study, index)
+    outcome = _run(study, np.repeat(index[:, None], block_size(study), axis=1), 1)
+    outcome = with_diagnoses(study, jax.tree.map(lambda part: part[:1], outcome), lambda trial: recording)
+    return recording, jax.tree.map(lambda part: part[0], outcome)
 
 
 def run_locally(study: Study, numbers: Sequence[int]) -> Iterator[tuple[int, Outcome]]:
@@ -142,7 +144,15 @@ def _run(study: Study, index: np.ndarray, cores: int | None) -> Outcome:
     if any(runs_alone(choice) for choice in study.estimators):
         cores = 1
     outcomes = in_parallel(work, blocks, cores)
-    return Outcome(*(np.concatenate(part)[:count] for part in zip(*outcomes, strict=True)))
+    return jax.tree.map(lambda *parts: np.concatenate(parts)[:count], *outcomes)
+
+
+def _recording(study: Study, place: np.ndarray) -> Recording:
+    """The recording of one trial by its place on the study's axes (axes,), as NumPy arrays."""
+    where = cells(study, place[:, None])
+    command = Wheels(*(u[0] for u in _commands(study, place[:, None], where)))
+    cell = jax.tree.map(lambda leaf: leaf[0], where)
+    return jax.tree.map(np.asarray, _record(jax.random.key(study.seed), cell, command, study.effect_names))
 
 
 def _commands(study: Study, index: np.ndarray, where: Cell) -> Wheels:

@@ -29,7 +29,7 @@ from jaxident.estimation.poses.runs import Runs
 from jaxident.estimation.uncertainty.precision import difference_covariance
 from jaxident.log import Log
 from jaxident.robot.difference import to_difference
-from jaxident.robot.model import difference_vector
+from jaxident.robot.model import DIFFERENCE_ORDER, difference_vector
 from jaxident.robot.path_length import path_length
 from jaxident.study.sight import (
     AT_REST,
@@ -88,7 +88,11 @@ def see(command: Wheels, pose: Pose, period: Array, wheels: Wheels | None = None
 def estimate(choice: Choice, sight: Sight, moves: Array) -> Finding:
     """Run one estimator; numbers of a failed estimate are NaN, so that nothing can average them. A robot that never
     moves (`moves`) fails whatever is found in the camera's noise."""
-    found = METHODS[choice.method].run(sight, settings_of(choice))
+    run = METHODS[choice.method].run
+    if run is None:  # what is not compiled is put in its place later
+        none = jnp.full(len(DIFFERENCE_ORDER), jnp.nan)
+        return Finding(none, none, jnp.asarray(NOT_FINITE, jnp.int8))
+    found = run(sight, settings_of(choice))
     finite = jnp.all(jnp.isfinite(found.estimate))
     reason = jnp.where(found.reason != FOUND, found.reason, jnp.where(finite, FOUND, NOT_FINITE))
     reason = jnp.where(moves, reason, AT_REST).astype(jnp.int8)
@@ -192,6 +196,8 @@ _POSES = {
 }  # fmt: skip
 BEST = "maximum-likelihood"
 """The method whose errors come near the Cramér-Rao bound."""
+DIAGNOSE = "diagnose"
+"""The method that names effects as well, and takes seconds a trial."""
 METHODS = {
     "batch": Method(batch, _PAPER),
     "recursive": Method(
@@ -201,5 +207,6 @@ METHODS = {
     "key-term-least-squares": Method(key_terms, _WHOLE),
     "instrumental-variables": Method(instrumental, _WHOLE),
     BEST: Method(likelihood, _WHOLE | _POSES, alone=True),
+    DIAGNOSE: Method(None, {"horizon": Setting(0.0, _number(-1e-9, 1e3), "0 (the default rule) or seconds")}),
 }
 """Every estimator by name."""

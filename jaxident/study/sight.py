@@ -14,10 +14,11 @@ REASONS = (
     "no start values",
     "the estimate is not finite",
     "the search did not arrive",
+    "the log was refused",
 )
 """How an estimate ended; its index is stored with every trial, 0 is success."""
 
-FOUND, AT_REST, NO_START, NOT_FINITE, NOT_ARRIVED = range(5)
+FOUND, AT_REST, NO_START, NOT_FINITE, NOT_ARRIVED, REFUSED = range(6)
 
 
 class Sight(NamedTuple):
@@ -54,12 +55,13 @@ class Setting(NamedTuple):
 class Method(NamedTuple):
     """run(sight, settings) -> Finding, and the settings it takes.
 
+    A method without `run` is no part of the compiled program of a trial (`study.diagnosed`).
     alone: no two of its programs may run at once in a process. Its eigenvalues come from LAPACK, whose batched call
     hands its work to XLA's threads and waits for them, on one of these itself; with as many programs as threads, all
     wait for ever.
     """
 
-    run: Callable[[Sight, dict[str, Any]], Finding]
+    run: Callable[[Sight, dict[str, Any]], Finding] | None
     settings: dict[str, Setting]
     alone: bool = False
 

@@ -70,12 +70,16 @@ class Plan(NamedTuple):
 
 class Outcome(NamedTuple):
     """estimate and deviation (estimators, 12), truth (12,), all in DIFFERENCE_ORDER, and reason (estimators,): indices
-    of `sight.REASONS`."""
+    of `sight.REASONS`. What diagnoses say (`study.diagnosed`), None in studies without: verdict (estimators,),
+    takes_part and named (estimators, effects)."""
 
     estimate: Any
     deviation: Any
     truth: Any
     reason: Any
+    verdict: Any = None
+    takes_part: Any = None
+    named: Any = None
 
 
 class Recording(NamedTuple):

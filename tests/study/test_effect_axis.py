@@ -9,11 +9,11 @@ from support.studies import ROBOT, SMALL, UNDER_EFFECTS
 
 import jaxident as ji
 from jaxident.robot.model import Discovered
-from jaxident.study.dataset import coordinates, describe, study_arrays
+from jaxident.study.dataset import FURTHER_AXES, coordinates, describe, study_arrays
 from jaxident.study.design import Candidate
 from jaxident.study.engine import cells, run_one
 from jaxident.study.statistics import summarise
-from jaxident.study.trial import Outcome, commands, record
+from jaxident.study.trial import commands, record
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,7 @@ def test_it_is_the_study_of_robots_that_have_these_effects(under_effects):
         for one in UNDER_EFFECTS.effects
     )
     other = study_arrays(SMALL._replace(robots=robots))
-    for name in Outcome._fields:
+    for name in FURTHER_AXES:
         np.testing.assert_array_equal(under_effects[name].squeeze("robot"), other[name])
 
 
@@ -68,7 +68,7 @@ def test_effects_share_their_random_numbers(under_effects):
 def test_a_trial_alone_is_the_trial_in_the_study(under_effects, number):
     at = dict(zip(UNDER_EFFECTS.axes, np.unravel_index(number, UNDER_EFFECTS.shape), strict=True))
     outcome = run_one(UNDER_EFFECTS, number)[1]
-    for name in outcome._fields:
+    for name in FURTHER_AXES:
         np.testing.assert_array_equal(getattr(outcome, name), under_effects[name].isel(at))
 
 

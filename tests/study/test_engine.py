@@ -9,7 +9,7 @@ from jaxident.effects.apply import sized, with_effects
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.robot.excitation import staircase
 from jaxident.study import engine, trial
-from jaxident.study.dataset import study_arrays
+from jaxident.study.dataset import FURTHER_AXES, study_arrays
 from jaxident.study.engine import chunk_shape, chunks, pieces, run_chunk, run_one
 from jaxident.study.sight import AT_REST, FOUND, NOT_FINITE, REASONS, Finding, Method
 from jaxident.study.statistics import summarise
@@ -52,7 +52,7 @@ def test_named_axes_and_truth(whole):
 def test_a_trial_alone_is_the_trial_in_the_study(whole, number):
     recording, outcome = run_one(SMALL, number)
     at = dict(zip(whole["truth"].dims, np.unravel_index(number, SMALL.shape), strict=False))
-    for name in outcome._fields:
+    for name in FURTHER_AXES:
         np.testing.assert_array_equal(getattr(outcome, name), whole[name].isel(at))
     noise = SMALL.noise[at["noise"]]
     assert 0.3 * noise < np.std(recording.measured.x - recording.exact.x) < 3.0 * noise

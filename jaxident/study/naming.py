@@ -1,0 +1,71 @@
+"""What the diagnoses of a study name: right names, wrong ones, and how often nothing is claimed.
+
+Every number is a mean over the trials of a cell whose log was not refused; its standard error is that of a mean. An
+effect counts as named under its own name alone, also where a diagnosis says that another one looks the same.
+"""
+
+import json
+import warnings
+from typing import Any
+
+import numpy as np
+import xarray
+
+from jaxident.diagnosis.decide import VERDICTS
+from jaxident.study.statistics import cell_axes
+
+CLAIMS = tuple(VERDICTS.index(name) for name in ("effects", "partly", "unknown"))
+"""Verdicts that say that something acts which the nominal model has not."""
+
+
+def naming(trials: xarray.Dataset) -> xarray.Dataset | None:
+    """Statistics of the diagnoses of a study, by cell and diagnosis; None of a study without.
+
+    Args:
+        trials: of `jaxident.study`.
+
+    Returns:
+        xarray.Dataset: `in_force`, whether an effect acts; `share_named` and mean `takes_part` of each effect; and of
+            each cell the share of trials in which all effects in force are named (`all_named`), in which these are
+            all that is named (`right`), in which anything is claimed (`claimed`), and the mean number of names that
+            are not in force (`false_names`), each with its standard error (`_se`); `diagnosed`: trials that count.
+
+    Examples:
+        >>> import jaxident as ji
+        >>> ji.start_jax()
+        >>> content = {"seeds": 8, "noise": [1e-5], "robots": [{"model": "published"}], "estimators": ["batch"]}
+        >>> ji.naming(ji.study(content)) is None
+        True
+    """
+    if "named" not in trials:
+        return None
+    chosen = np.flatnonzero((trials["verdict"] >= 0).any(trials["reason"].dims[:-1]).values)
+    named, verdict = (trials[name].isel(estimator=chosen).load() for name in ("named", "verdict"))
+    there = in_force(trials)
+    seen = verdict >= 0
+    missed = (~named.astype(bool) & there).any("catalogue")
+    false = (named.astype(bool) & ~there).sum("catalogue")
+    claimed = verdict.isin(CLAIMS)
+    of_trials = {"all_named": ~missed, "right": ~missed & (false == 0), "claimed": claimed, "false_names": false}
+    means = {name: value.astype(float).where(seen) for name, value in of_trials.items()}
+    means |= {"share_named": named.where(seen), "takes_part": trials["takes_part"].isel(estimator=chosen).where(seen)}
+    found: dict[str, Any] = {"in_force": there, "diagnosed": seen.sum("seed")}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # cells without a diagnosis: NaN is right
+        for name, value in means.items():
+            found[name] = value.mean("seed")
+            found[f"{name}_se"] = value.std("seed", ddof=1) / np.sqrt(value.count("seed"))
+    axes = cell_axes(trials)
+    made = xarray.Dataset(found).transpose(*axes, "estimator", "catalogue", missing_dims="ignore")
+    return made.drop_vars([name for name in made.coords if name not in made.dims]).assign_attrs(trials.attrs)
+
+
+def in_force(trials: xarray.Dataset) -> xarray.DataArray:
+    """Whether each effect of the catalogue acts (robot, effect where a study has that axis, catalogue)."""
+    told, names = json.loads(trials.attrs["study"]), list(trials["catalogue"].values)
+    robots = [one.get("effects", {}) for one in told["robots"]]
+    added = [one["effects"] for one in told.get("effects", [{"effects": {}}])]
+    there = np.array([[[name in own or name in more for name in names] for more in added] for own in robots])
+    if "effect" in trials.dims:
+        return xarray.DataArray(there, dims=("robot", "effect", "catalogue"))
+    return xarray.DataArray(there[:, 0], dims=("robot", "catalogue"))
