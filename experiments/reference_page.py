@@ -24,7 +24,7 @@ GROUPS = {
     "Simulate": ("simulate", "excite", "EXCITATIONS", "path_length"),
     "Identify and predict": ("identify", "identify_motors", "predict", "cramer_rao", "bootstrap"),
     "Diagnose": ("diagnose", "plan"),
-    "Many trials": ("Study", "read_study", "summarise"),
+    "Many trials": ("Study", "read_study", "summarise", "naming"),
     "Small types": ("Wheels", "Pose", "State", "Increment", "WheelSensor"),
     "Errors": ("InputError", "WorkError"),
 }

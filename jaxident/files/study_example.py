@@ -39,5 +39,6 @@ method = "batch"            # PAPER section VI
 method = "recursive"        # batch on the setup time, then recursive least squares
 settings = { setup_samples = 100 }              # also forgetting
                             # "maximum-likelihood" takes coupling = true, for robots whose speeds change each other
-                            # (as those of "published" do), and wheels = false, which leaves wheel speeds aside
+                            # (as those of "published" do), and wheels = false, which leaves wheel speeds aside;
+                            # "diagnose" also names effects, and takes seconds a trial
 """

@@ -66,6 +66,6 @@ def in_force(trials: xarray.Dataset) -> xarray.DataArray:
     robots = [one.get("effects", {}) for one in told["robots"]]
     added = [one["effects"] for one in told.get("effects", [{"effects": {}}])]
     there = np.array([[[name in own or name in more for name in names] for more in added] for own in robots])
-    if "effect" in trials.dims:
-        return xarray.DataArray(there, dims=("robot", "effect", "catalogue"))
-    return xarray.DataArray(there[:, 0], dims=("robot", "catalogue"))
+    axes = ("robot", "effect", "catalogue") if "effect" in trials.dims else ("robot", "catalogue")
+    there = there if "effect" in trials.dims else there[:, 0]
+    return xarray.DataArray(there, dims=axes, coords={axis: trials[axis].values for axis in axes})

@@ -3,7 +3,7 @@
 import numpy as np
 import xarray
 
-from jaxident.study.dataset import FURTHER_AXES, coordinates, layout
+from jaxident.study.dataset import coordinates, further_axes, layout
 
 
 def invented(study):
@@ -13,5 +13,5 @@ def invented(study):
     arrays["truth"] += 1.0
     arrays["deviation"] += 0.01
     arrays["estimate"] = 1.0 + 0.01 * draws.normal(size=arrays["estimate"].shape)
-    named = {name: (study.axes + FURTHER_AXES[name], array) for name, array in arrays.items()}
+    named = {name: (study.axes + further_axes(study)[name], array) for name, array in arrays.items()}
     return xarray.Dataset(named).assign_coords(coordinates(study).coords).assign_attrs(coordinates(study).attrs)
