@@ -18,6 +18,7 @@ from jaxident.estimation.ahead.parameter_spread import directions
 from jaxident.estimation.ahead.stretches import AXES, Starts, cut_stretches, until_last_start
 from jaxident.estimation.increments.observations import blind, repeats
 from jaxident.log import Log
+from jaxident.numerics import wrap
 from jaxident.parallel import in_parallel
 from jaxident.robot.model import Model
 from jaxident.robot.noise import Noise
@@ -74,22 +75,33 @@ def run_ahead(model: Model, log: Log, starts: Starts, horizon: int, *, burn_in: 
     def run(robot: Model, stretch: Stretch) -> Run:
         return _in_blocks(vector_of(robot), laws_of(robot.discovered), noise, lost, stretch, first)
 
-    found, run_up = _filtered(partial(run, model), stretch, ahead, burn_in)
+    found, stretch, run_up = _filtered(partial(run, model), stretch, ahead, burn_in)
     pose, begin, slip = (np.moveaxis(leaf[ahead], -1, 0) for leaf in found[:3])
-    slopes = [(np.moveaxis(run(other, stretch).pose[ahead], -1, 0) - pose) / size for other, size in directions(model)]
+    slopes = [
+        _less(np.moveaxis(run(other, stretch).pose[ahead], -1, 0), pose) / size for other, size in directions(model)
+    ]
     return Ahead(pose, begin, slip, np.array(slopes).reshape(-1, *pose.shape), run_up)
 
 
-def _filtered(run: Callable[[Stretch], Run], stretch: Stretch, ahead: slice, burn_in: int) -> tuple[Run, Array]:
+def _less(pose: Array, other: Array) -> np.ndarray:
+    """Poses (..., 3) less others next to them, whose headings may be told in other turns."""
+    change = pose - other
+    change[..., 2] = np.asarray(wrap(change[..., 2]))
+    return change
+
+
+def _filtered(
+    run: Callable[[Stretch], Run], stretch: Stretch, ahead: slice, burn_in: int
+) -> tuple[Run, Stretch, Array]:
     """The filter and the free run of every stretch, over the rows `ahead`; where it does not converge, a run-up of the
-    commands from rest, laid on the last pose; and where that is."""
+    commands from rest, laid on the last pose; the stretches as they were run, and where they are run-ups."""
     found = run(stretch)
     late = slice(max(ahead.start - burn_in, 0), ahead.start)
     seen = np.maximum(stretch.seen[late].sum(axis=0), 1)
     misses = found.innovation[late].sum(axis=0) / (3.0 * seen)
     lost = ~(np.isfinite(found.pose[ahead.stop - 1]).all(axis=0) & (misses < DIVERGED))
     if not lost.any():
-        return found, lost
+        return found, stretch, lost
     rows = np.arange(len(stretch.t))[:, None]
     last = len(rows) - 1 - np.argmax(stretch.seen[::-1], axis=0)
     other = stretch._replace(
@@ -97,7 +109,7 @@ def _filtered(run: Callable[[Stretch], Run], stretch: Stretch, ahead: slice, bur
         speeds=np.where(lost, np.nan, stretch.speeds),
     )  # fmt: skip
     again = run(other)
-    return Run(*(np.where(lost, new, old) for new, old in zip(again, found, strict=True))), lost
+    return Run(*(np.where(lost, new, old) for new, old in zip(again, found, strict=True))), other, lost
 
 
 _run_block = jax.jit(filter_and_run)

@@ -146,6 +146,11 @@ def test_a_start_that_does_not_converge_comes_from_a_run_up_and_is_counted():
     assert np.all(found.run_up == (found.start == 120))
     rows = found.start + found.step
     assert np.abs(found.x - log.x[rows]).max() < 0.005
+    uncertain = dataclasses.replace(model, covariance=np.diag([1e-4, 1e-4]), parameter_order=("rate_1", "gain_21"))
+    again = predict(uncertain, log._replace(x=log.x + jumps, y=log.y - jumps, theta=log.theta + 6.0 * (jumps != 0.0)),
+                    20, stride=20)  # fmt: skip
+    assert np.any(again.run_up)
+    assert max(again.sd_x.max(), again.sd_y.max(), again.sd_theta.max()) < 0.5, "not the filter's run less the run-up's"
 
 
 @pytest.mark.slow
