@@ -26,12 +26,18 @@ def modelled_path(residual: Array, windows: Windows) -> tuple[np.ndarray, np.nda
     was seen."""
     found = np.asarray(windows.pose).transpose(1, 0, 2) - residual.reshape(*np.asarray(windows.step).T.shape, 3)
     seen = np.asarray(windows.seen).T
-    found[..., 2] = np.unwrap(found[..., 2], axis=1)
-    for window in np.flatnonzero(~seen.all(axis=1)):
-        rows, own = np.arange(seen.shape[1]), seen[window]
-        for k in range(3):
-            column = np.unwrap(found[window, own, k]) if k == 2 else found[window, own, k]
-            found[window, :, k] = np.interp(rows, rows[own], column)
+    if seen.all():
+        found[..., 2] = np.unwrap(found[..., 2], axis=1)
+        return found[..., 0], found[..., 1], found[..., 2]
+    rows, last = np.arange(seen.shape[1]), seen.shape[1] - 1
+    before = np.maximum.accumulate(np.where(seen, rows, 0), axis=1)
+    after = np.minimum.accumulate(np.where(seen, rows, last)[:, ::-1], axis=1)[:, ::-1]
+    first, end = seen.argmax(axis=1)[:, None], last - seen[:, ::-1].argmax(axis=1)[:, None]
+    before, after = np.maximum(before, first), np.minimum(after, end)  # beyond the poses seen: the nearest one
+    found[..., 2] = np.unwrap(np.take_along_axis(found[..., 2], before, axis=1), axis=1)
+    part = np.clip((rows - before) / np.maximum(after - before, 1), 0.0, 1.0)[..., None]
+    low, high = (np.take_along_axis(found, place[..., None], axis=1) for place in (before, after))
+    found = (1.0 - part) * low + part * high
     return found[..., 0], found[..., 1], found[..., 2]
 
 
