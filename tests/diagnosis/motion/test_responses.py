@@ -13,7 +13,7 @@ def test_what_was_not_seen_is_bridged_as_by_hand():
     seen = draws.random(windows.seen.shape) < 0.3
     seen[10] = True
     seen[:, 0] = True
-    pose = np.where(seen[..., None], windows.pose + [0.0, 0.0, 3.0], np.nan)
+    pose = np.where(seen[..., None], windows.pose + np.array([0.0, 0.0, 3.0]), np.nan)
     pose[..., 2] = (pose[..., 2] + np.pi) % (2.0 * np.pi) - np.pi
     residual = 0.01 * draws.normal(size=(pose.shape[1], 3 * len(pose)))
     found = modelled_path(residual, windows._replace(pose=pose, seen=seen))
