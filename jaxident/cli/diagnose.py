@@ -72,12 +72,14 @@ def command(logs, columns, sim, model, horizon, out, seed):
     records, simulated = read_logs(logs, columns), find_logs(sim) if sim else find_simulated(logs)
     theirs = [read_log(path) for path in simulated]
     nominal = load_model(model) if model else None
-    warn((*log_suspicions(join(records)), *suspected_wheels(join(records))), columns)
+    at_once = (*log_suspicions(join(records)), *suspected_wheels(join(records)))
+    warn(at_once, columns)
     warn(f"the simulator's logs: {line}" for line in (log_suspicions(join(theirs)) if theirs else ()))
     make_folder(out)  # what cannot be written is told before the work, not after it
     check_outputs(*(os.path.join(out, name) for name in OUTPUTS))
     with working("diagnosing"), advising(columns):
         found = diagnose(records, sim=theirs or None, model=nominal, horizon=horizon, seed=seed)
+    warn(line for line in found.suspicions if line not in at_once)
     made = origin(OUTPUTS[0], logs=find_logs(logs), sim=simulated)
     click.echo("\n".join(_told(found)))
     write_json(with_provenance(diagnosis_to_dict(found), made, OUTPUTS[0]), os.path.join(out, OUTPUTS[0]))

@@ -2,7 +2,7 @@
 
 from jaxident.diagnosis.account.account import REST
 from jaxident.diagnosis.decide import DIFFERENT, Parameter
-from jaxident.diagnosis.diagnose import Diagnosis
+from jaxident.diagnosis.diagnose import COASTED, Diagnosis
 from jaxident.report import words
 from jaxident.report.discovered import sentence
 from jaxident.report.words import EFFECTS, NOMINAL, error, number, parameters, percent, plain, together
@@ -18,12 +18,13 @@ def lead(found: Diagnosis) -> str:
 
 
 def details(found: Diagnosis) -> str:
-    """What the headline leaves out: shares, known effects of another size, look-alikes and what was refused; empty
-    where there is nothing of that."""
+    """What the headline leaves out: shares, known effects of another size, look-alikes, what was refused, and rates
+    that are no measurement; empty where there is nothing of that."""
     named = found.verdict in ("effects", "partly")
     own = f"{_due(found)}{_resized(found)}{_doubt(found)}" if named else ""
     refused = f" {told}" if (told := refusal(found)) else ""
-    return f"{own}{refused}".strip()
+    held = f" {COASTED[0].upper()}{COASTED[1:]}." if COASTED in found.suspicions else ""
+    return f"{own}{refused}{held}".strip()
 
 
 def headline(found: Diagnosis) -> str:

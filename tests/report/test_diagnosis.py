@@ -8,6 +8,7 @@ from support.diagnoses import LARGEST, VERDICTS, discovered_law, finding_of, mad
 
 from jaxident.diagnosis.account.odometry import Odometry
 from jaxident.diagnosis.decide import Parameter
+from jaxident.diagnosis.diagnose import COASTED
 from jaxident.diagnosis.discovery.candidates import Kind
 from jaxident.diagnosis.smallest_effects import smallest_sizes
 from jaxident.effects.catalogue import CATALOGUE
@@ -256,6 +257,12 @@ def test_laws_that_explain_nearly_as_much_are_named():
         "Acceleration along, speed times a curve of the turn rate w: nearly as much would be explained by "
         "speed sideways, a curve of the heading."
     )
+
+
+def test_rates_that_are_no_measurement_are_told():
+    told = lead(made_up("unknown")._replace(suspicions=(COASTED,)))
+    assert "rates are held at 3 1/s" in told
+    assert "coast" not in lead(made_up("unknown"))
 
 
 def test_what_the_judging_runs_refuse_is_told_in_a_sentence():
