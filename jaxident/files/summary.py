@@ -15,7 +15,7 @@ from jaxident.study.statistics import cell_axes
 NUMBERS = ("truth", "trials", "failed", "bias", "bias_se", "sd", "sd_se", "rmse", "rmse_se", "coverage", "coverage_se")
 """Columns after the axes of the cells (`effect` where the study has it), estimator and parameter; then come q05 and so
 on, the quantiles of the error, and rmse_over_bound where there is a bound."""
-OF_CELL, OF_EFFECT = ("all_named", "right", "claimed", "false_names"), ("share_named", "takes_part")
+OF_CELL, OF_EFFECT = ("all_named", "right", "right_or_alike", "claimed", "false_names"), ("share_named", "takes_part")
 """Numbers of `study.naming`, each followed by its standard error."""
 
 

@@ -16,12 +16,14 @@ LEVELS = {
 """Axes of numbers, the first of which with several levels is drawn: what it is called, and the factor of its unit."""
 MOST_LINES, MOST_COLUMNS, MOST_ROWS = 5, 14, 24
 """Of a picture: more cannot be told apart, or read."""
+SHARES = ("all_named", "right", "right_or_alike", "claimed")
 LISTED = 60
 """Rows of the table; naming.csv has all."""
 TEXT = (
     "A diagnosis of each trial's log names the effects that it finds. Right: it names all effects that act, and no "
-    "other. An effect counts under its own name alone, also where the diagnosis says that another looks the same. "
-    "Claimed: it says that something acts that the nominal model has not. Logs that were refused count nowhere here."
+    "other, each under its own name. Or alike: a wrong name counts, too, where the diagnosis says that it cannot tell "
+    "that effect from the one that acts. Claimed: it says that something acts that the nominal model has not. Logs that "
+    "were refused count nowhere here."
 )
 CAPTION = (
     "Per cent of trials in which an effect is named, all else averaged. Rows: what acts; framed fields: the effects "
@@ -44,8 +46,8 @@ def naming_lead(named: xarray.Dataset | None) -> str:
     for one in map(str, named["estimator"].values):
         at = named.sel(estimator=one)
         count, weight = int(at["diagnosed"].sum()), at["diagnosed"] / max(int(at["diagnosed"].sum()), 1)
-        right, false = (float((at[name] * weight).sum()) for name in ("right", "false_names"))
-        told.append(f"{one} is right in {round(right * count)} of {count} trials, with {false:.2f} wrong names a trial")
+        right, alike, false = (round(float((at[n] * weight).sum()) * count) for n in (*SHARES[1:3], "false_names"))
+        told.append(f"{one} is right in {right} of {count} trials ({alike} with look-alikes); {false} names are wrong")
     return f"{'; '.join(told)}. "
 
 
@@ -104,10 +106,10 @@ def _table(named: xarray.Dataset) -> Table:
     rows = []
     for index in list(np.ndindex(values["right"].shape))[:LISTED]:
         at = {name: float(value[index]) for name, value in values.items()}
-        shares = [f"{100 * at[name]:.0f} ± {100 * at[f'{name}_se']:.0f}" for name in ("all_named", "right", "claimed")]
+        shares = [f"{100 * at[name]:.0f} ± {100 * at[f'{name}_se']:.0f}" for name in SHARES]
         wrong = f"{at['false_names']:.2f} ± {at['false_names_se']:.2f}"
         cell = [entry(named, key, index[keys.index(key)]) for key in told]
         rows.append((*cell, int(at["diagnosed"]), *shares, wrong))
-    titles = (*told, "diagnosed", "all named", "right", "claimed", "wrong names a trial")
+    titles = (*told, "diagnosed", "all named", "right", "or alike", "claimed", "wrong names a trial")
     more = f" The first {LISTED} of {values['right'].size}." if values["right"].size > LISTED else ""
     return Table(titles, rows, f"Shares in per cent, ± one standard error.{more}")

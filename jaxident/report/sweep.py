@@ -73,6 +73,8 @@ def what_next(study: Study, summary: xarray.Dataset) -> str:
     failed = int(summary["failures"].sum())
     if failed:
         return f"Find out why {failed} estimates failed: the table below counts them by reason. {SINGLE}"
+    if study.diagnoses:
+        return SINGLE
     best = [choice.name for choice in study.estimators if choice.method == BEST]
     blind = [one.name for one in study.estimators if one.method == BEST and not settings_of(one)["coupling"]]
     if "rmse_over_bound" not in summary or not ((blind and coupled(study)) or not best):

@@ -30,6 +30,7 @@ OF_DIAGNOSES = {
     "verdict": ("estimator",),
     "takes_part": ("estimator", "catalogue"),
     "named": ("estimator", "catalogue"),
+    "alike": ("estimator", "catalogue"),
 }
 """Those that only studies with diagnoses have."""
 _SMALL = ("reason", "verdict")
@@ -51,6 +52,7 @@ _MEANING: dict[str, dict[str, Any]] = {
     },
     "takes_part": {"long_name": "probability that the effect takes part, NaN where the estimator gives none"},
     "named": {"long_name": "1 where the diagnosis names the effect, NaN where the estimator names none"},
+    "alike": {"long_name": "1 where the diagnosis says that an effect it names looks like this one, NaN likewise"},
 }
 _UNITS = {"alpha": "1", "dead_zone": "unit", "1": "m/unit", "2": "rad/unit"}
 

@@ -30,14 +30,15 @@ NO_VERDICT = -1
 
 class Naming(NamedTuple):
     """verdict: a place in VERDICTS; takes_part (effects,): probability of each effect of the catalogue; named
-    (effects,): 1 where it is named, else 0."""
+    (effects,): 1 where it is named, else 0; alike (effects,): 1 where the diagnosis says that a named one looks so."""
 
     verdict: Any
     takes_part: Any
     named: Any
+    alike: Any
 
 
-NO_NAMING = Naming(NO_VERDICT, np.full(len(CATALOGUE), np.nan), np.full(len(CATALOGUE), np.nan))
+NO_NAMING = Naming(NO_VERDICT, *[np.full(len(CATALOGUE), np.nan)] * 3)
 
 
 def with_diagnoses(study: Study, outcome: Outcome, recording: Callable[[int], Recording]) -> Outcome:
@@ -52,8 +53,8 @@ def with_diagnoses(study: Study, outcome: Outcome, recording: Callable[[int], Re
         for place in study.diagnoses:
             found, naming[trial][place] = diagnose_log(log, settings_of(study.estimators[place])["horizon"])
             estimate[trial, place], deviation[trial, place], reason[trial, place] = found
-    verdict, takes_part, named = (np.array([[own[k] for own in row] for row in naming]) for k in range(3))
-    return Outcome(estimate, deviation, outcome.truth, reason, verdict.astype("i1"), takes_part, named)
+    verdict, *of_effects = (np.array(part) for part in zip(*(zip(*row, strict=True) for row in naming), strict=True))
+    return Outcome(estimate, deviation, outcome.truth, reason, verdict.astype("i1"), *of_effects)
 
 
 def log_of(made: Recording) -> Log:
@@ -77,8 +78,9 @@ def naming_of(found: Diagnosis) -> Naming:
     """What a diagnosis says of every effect of the catalogue."""
     probability = {cause.effect: cause.probability for cause in found.judgement.causes}
     takes_part = np.array([probability.get(name, 0.0) for name in CATALOGUE])
-    named = np.array([float(name in found.selected) for name in CATALOGUE])
-    return Naming(VERDICTS.index(found.verdict), takes_part, named)
+    others = {one for c in found.judgement.causes if c.effect in found.selected for one in c.indistinguishable_from}
+    named, alike = (np.array([float(name in names) for name in CATALOGUE]) for names in (found.selected, others))
+    return Naming(VERDICTS.index(found.verdict), takes_part, named, alike)
 
 
 def parameters_of(model: Model) -> tuple[np.ndarray, np.ndarray]:

@@ -1,7 +1,8 @@
 """What the diagnoses of a study name: right names, wrong ones, and how often nothing is claimed.
 
 Every number is a mean over the trials of a cell whose log was not refused; its standard error is that of a mean. An
-effect counts as named under its own name alone, also where a diagnosis says that another one looks the same.
+effect counts as named under its own name alone, but for `right_or_alike`: there a wrong name stands for an effect that
+the diagnosis says it cannot tell from a named one.
 """
 
 import json
@@ -27,8 +28,9 @@ def naming(trials: xarray.Dataset) -> xarray.Dataset | None:
     Returns:
         xarray.Dataset: `in_force`, whether an effect acts; `share_named` and mean `takes_part` of each effect; and of
             each cell the share of trials in which all effects in force are named (`all_named`), in which these are
-            all that is named (`right`), in which anything is claimed (`claimed`), and the mean number of names that
-            are not in force (`false_names`), each with its standard error (`_se`); `diagnosed`: trials that count.
+            all that is named (`right`), the same with look-alikes (`right_or_alike`), in which anything is claimed
+            (`claimed`), and the mean number of names that are not in force (`false_names`), each with its standard
+            error (`_se`); `diagnosed`: trials that count.
 
     Examples:
         >>> import jaxident as ji
@@ -40,13 +42,16 @@ def naming(trials: xarray.Dataset) -> xarray.Dataset | None:
     if "named" not in trials:
         return None
     chosen = np.flatnonzero((trials["verdict"] >= 0).any(trials["reason"].dims[:-1]).values)
-    named, verdict = (trials[name].isel(estimator=chosen).load() for name in ("named", "verdict"))
+    named, verdict, alike = (trials[name].isel(estimator=chosen).load() for name in ("named", "verdict", "alike"))
     there = in_force(trials)
     seen = verdict >= 0
-    missed = (~named.astype(bool) & there).any("catalogue")
-    false = (named.astype(bool) & ~there).sum("catalogue")
+    missing = there & (named != 1.0)
+    missed, other = missing.any("catalogue"), (missing & (alike != 1.0)).any("catalogue")
+    false = (~there & (named == 1.0)).sum("catalogue")
     claimed = verdict.isin(CLAIMS)
-    of_trials = {"all_named": ~missed, "right": ~missed & (false == 0), "claimed": claimed, "false_names": false}
+    instead = ~other & (false <= missing.sum("catalogue"))
+    of_trials = {"all_named": ~missed, "right": ~missed & (false == 0), "right_or_alike": instead, "claimed": claimed,
+                 "false_names": false}  # fmt: skip
     means = {name: value.astype(float).where(seen) for name, value in of_trials.items()}
     means |= {"share_named": named.where(seen), "takes_part": trials["takes_part"].isel(estimator=chosen).where(seen)}
     found: dict[str, Any] = {"in_force": there, "diagnosed": seen.sum("seed")}

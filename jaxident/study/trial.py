@@ -71,7 +71,7 @@ class Plan(NamedTuple):
 class Outcome(NamedTuple):
     """estimate and deviation (estimators, 12), truth (12,), all in DIFFERENCE_ORDER, and reason (estimators,): indices
     of `sight.REASONS`. What diagnoses say (`study.diagnosed`), None in studies without: verdict (estimators,),
-    takes_part and named (estimators, effects)."""
+    takes_part, named and alike (estimators, effects)."""
 
     estimate: Any
     deviation: Any
@@ -80,6 +80,7 @@ class Outcome(NamedTuple):
     verdict: Any = None
     takes_part: Any = None
     named: Any = None
+    alike: Any = None
 
 
 class Recording(NamedTuple):

@@ -63,9 +63,9 @@ def test_a_trial_alone_is_diagnosed_as_in_the_study(trials):
     """Also as by `diagnose` on the log that the trial leaves."""
     recording, outcome = run_one(STUDY, 1)
     whole = trials.isel(effect=1).squeeze()
-    for name in ("estimate", "deviation", "verdict", "takes_part", "named"):
+    for name in ("estimate", "deviation", "verdict", "takes_part", "named", "alike"):
         np.testing.assert_array_equal(getattr(outcome, name), whole[name])
-    verdict, _, named = naming_of(ji.diagnose(log_of(recording)))
+    verdict, _, named, _ = naming_of(ji.diagnose(log_of(recording)))
     assert verdict == whole["verdict"].sel(estimator="named")
     np.testing.assert_array_equal(named, whole["named"].sel(estimator="named"))
 

@@ -39,6 +39,10 @@ def trials():
     told[1, 1, 3], named[1, 1, 3] = -1, np.nan
     told[0, 1, 0], named[0, 1, 0, SLOPE] = VERDICTS.index("effects"), 1.0
     assert int(made["named"].sum()) == 8, "these are views of what is returned"
+    alike = made["alike"].isel(estimator=1).squeeze().transpose("effect", "noise", "seed", ...).values
+    named[0, 1, 0, LOSS] = 0.0
+    alike[0, 1, 0, LAG] = 1.0  # a wrong name for nothing stays wrong
+    named[1, 1, 2, LOSS], alike[1, 1, 2, LAG] = 1.0, 1.0
     return made.assign(takes_part=0.9 * made["named"])
 
 
@@ -50,12 +54,14 @@ def test_names_are_counted_by_what_is_in_force(trials):
     assert lag["diagnosed"].values.tolist() == [4, 3]
     assert lag["all_named"].values == pytest.approx([1.0, 2.0 / 3.0])
     assert lag["right"].values == pytest.approx([0.75, 2.0 / 3.0])
-    assert lag["false_names"].values == pytest.approx([0.25, 0.0])
+    assert lag["right_or_alike"].values == pytest.approx([0.75, 1.0]), "an extra name is wrong whatever it looks like"
+    assert lag["false_names"].values == pytest.approx([0.25, 1.0 / 3.0])
     assert lag["claimed"].values == pytest.approx([1.0, 2.0 / 3.0])
-    assert lag["share_named"].sel(catalogue="turn_loss").values == pytest.approx([0.25, 0.0])
+    assert lag["share_named"].sel(catalogue="turn_loss").values == pytest.approx([0.25, 1.0 / 3.0])
     assert lag["takes_part"].sel(catalogue="motor_lag").values == pytest.approx([0.9, 0.6])
     none = found.sel(effect="none")
     assert none["right"].values == pytest.approx([1.0, 0.75])
+    assert none["right_or_alike"].values == pytest.approx([1.0, 0.75])
     assert none["claimed"].values == pytest.approx([0.0, 0.25])
 
 
@@ -92,5 +98,5 @@ def test_the_tables_hold_what_was_counted(trials, tmp_path):
 def test_the_page_tells_of_names(trials, tmp_path):
     write_study(STUDY, trials, summarise(trials), tmp_path / "index.html", naming(trials))
     text = (tmp_path / "index.html").read_text()
-    assert "told is right in 12 of 15 trials, with 0.13 wrong names a trial" in text
+    assert "told is right in 12 of 15 trials (13 with look-alikes); 3 names are wrong" in text
     assert "What the diagnoses name" in text
