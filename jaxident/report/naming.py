@@ -22,8 +22,8 @@ LISTED = 60
 TEXT = (
     "A diagnosis of each trial's log names the effects that it finds. Right: it names all effects that act, and no "
     "other, each under its own name. Or alike: a wrong name counts, too, where the diagnosis says that it cannot tell "
-    "that effect from the one that acts. Claimed: it says that something acts that the nominal model has not. Logs that "
-    "were refused count nowhere here."
+    "that effect from the one that acts. Claimed: it says that something acts that the nominal model has not. Logs "
+    "that were refused count nowhere here."
 )
 CAPTION = (
     "Per cent of trials in which an effect is named, all else averaged. Rows: what acts; framed fields: the effects "
