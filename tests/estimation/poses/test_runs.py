@@ -11,7 +11,7 @@ from jaxident.estimation.poses.curvature import Point, local_at_best_deviations
 from jaxident.estimation.poses.maximum_likelihood import begin, fit_from
 from jaxident.estimation.poses.parameters import Law, Robot, to_vector
 from jaxident.estimation.poses.prior import prior_of
-from jaxident.estimation.poses.runs import WINDOW, pad_rows, rows_used, stack_runs
+from jaxident.estimation.poses.runs import MANY, WINDOW, pad_rows, rows_used, stack_runs
 from jaxident.log import join
 from jaxident.robot.noise import Noise
 
@@ -37,6 +37,15 @@ def test_logs_of_many_lengths_share_a_program():
         assert found.fit.innovations.normalised.shape == (1, 3, rows)
         assert compiled in (None, fit_from._cache_size())
         compiled = fit_from._cache_size()
+
+
+def test_many_short_runs_are_padded_by_less_than_an_eighth_of_a_window():
+    for rows, expected in ((40, 50), (50, 50), (176, 200)):
+        runs = stack_runs(join([logged(k, rows=rows) for k in range(MANY + 1)]))
+        padded = pad_rows(runs)
+        assert padded.seen.shape == (MANY + 1, expected)
+        assert int(padded.seen.sum()) == int(runs.seen.sum())
+        assert rows_used(padded) == rows
 
 
 def test_padding_is_whole_windows_and_an_eighth_at_most():
