@@ -5,7 +5,7 @@ import xarray
 
 from jaxident import plot
 from jaxident.plot.names import plain
-from jaxident.report.page import Figure, Section, Table
+from jaxident.report.page import PHONE, Figure, Section, Table
 from jaxident.report.sweep_maps import entry
 from jaxident.study.statistics import cell_axes
 
@@ -68,7 +68,7 @@ def _matrices(named: xarray.Dataset) -> list[Figure]:
         rows = list(map(plain, named[axis].values))[:MOST_ROWS]
         if not kept:
             continue
-        figure, ax = plot.figure(size=(6.3, 1.5 + 0.3 * len(rows)))
+        figure, ax = plot.figure(size=(PHONE if len(kept) <= 6 else 6.3, 1.5 + 0.3 * len(rows)))
         names = list(map(plain, named["catalogue"].values[kept]))
         plot.name_matrix(shares[:MOST_ROWS, kept], there[:MOST_ROWS, kept], rows=rows, columns=names, ax=ax)
         made.append(Figure(plot.image(figure), f"{one}: share of trials in which each effect is named", CAPTION))
@@ -90,7 +90,7 @@ def _curves(named: xarray.Dataset) -> list[Figure]:
                                np.sqrt((at["right_se"].sel({axis: each}) ** 2).sum(others).values) / cells)
             for each in named[axis].values[:MOST_LINES]
         }  # fmt: skip
-        figure, ax = plot.figure(size=(6.3, 3.2))
+        figure, ax = plot.figure(size=(PHONE, 3.2))
         plot.share_curves(factor * named[along].values, curves, xlabel=label, ylabel="right diagnoses [%]", ax=ax)
         first = f" The first {MOST_LINES} of {named.sizes[axis]}." if named.sizes[axis] > MOST_LINES else ""
         made.append(Figure(plot.image(figure), f"{one}: share of right diagnoses by {label}",
