@@ -11,7 +11,7 @@ from jaxident.diagnosis.causes.evidence import WRONG, Worth, evidence_of, worth
 from jaxident.diagnosis.causes.search import joining
 from jaxident.diagnosis.causes.search_rounds import TERMS, Found, search
 from jaxident.diagnosis.causes.settled import Settled
-from jaxident.diagnosis.fit.nominal import coasts, hold_rates
+from jaxident.diagnosis.fit.nominal import hold_rates
 from jaxident.diagnosis.fit.refit import Data, Solution
 from jaxident.diagnosis.motion.rims import untold
 from jaxident.diagnosis.noise.law import Law
@@ -93,8 +93,8 @@ def find_effects(prepared: Prepared, without: Collection[str] = (), law: Law | N
     that the catalogue is to lack. A noise law that is given stays as it is. Where the robot without effects coasts, its
     rates are held, and the search is made again."""
     found = search(prepared.windows, prepared.nominal, without, law)
-    while np.any(coasting := coasts(found.nominal, prepared.windows, bool(found.rest.terms))):
-        windows, nominal = hold_rates(prepared.windows, coasting)
+    while np.any(found.coasting):
+        windows, nominal = hold_rates(prepared.windows, found.coasting)
         prepared = prepared._replace(windows=windows, nominal=nominal)
         found = search(windows, nominal, without, law)
     if found.lost is not None:

@@ -19,6 +19,7 @@ from jaxident.diagnosis.causes.evidence import worth
 from jaxident.diagnosis.causes.moves import Move, better, fit_options, ranked, stands
 from jaxident.diagnosis.causes.search import MOST_EFFECTS, best_set
 from jaxident.diagnosis.causes.settled import Settled, noise_beside, same_law, whiten
+from jaxident.diagnosis.fit.nominal import coasts
 from jaxident.diagnosis.fit.refit import Data, Solution, refit
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.motion.rims import first_noise, untold
@@ -61,6 +62,11 @@ class Found(NamedTuple):
         return -self.nominal.cost > self.settled.now.evidence
 
     @property
+    def coasting(self) -> np.ndarray:
+        """Which speeds (2,) of the robot without effects coast."""
+        return coasts(self.nominal, self.settled.data.windows, bool(self.rest.terms))
+
+    @property
     def log_evidence(self) -> float:
         """Of effects, terms and noise law together."""
         now = self.settled.now
@@ -74,12 +80,15 @@ def search(windows: Windows, nominal: Solution, without: Collection[str] = (), l
     The search begins at white noise. Where its end leaves something, a second search begins at noise as the nominal fit
     leaves it. The end with the higher log evidence is taken. A nominal model misses a real robot by twenty times the
     camera's error, and a search that takes all of that for effects may lose its way. Where both ends are worse than
-    no effect at all, no effect is named.
+    no effect at all, no effect is named. Where the robot without effects coasts the first end is given back: its rates
+    are to be held, and the search made again (`finding.find_effects`).
     """
     begin, sized, without = Move(nominal, (), -nominal.cost), law is None, {*without, *untold(windows)}
     wheel = first_noise(nominal.linear.rims, np.exp(nominal.vector[:2]), windows)
     law = first_law(windows)._replace(wheel=wheel) if law is None else law
     ends = [climb(windows, nominal, begin, law, without, sized)]
+    if np.any(ends[0].coasting):
+        return ends[0]
     if sized and (ends[0].rest.terms or ends[0].worse_than_none):
         responses = respond(np.exp(nominal.vector[:2]), nominal.linear.residual, windows)
         law = size_noise(nominal.linear.residual, nominal.linear.starts, windows, responses)._replace(wheel=wheel)
