@@ -11,6 +11,7 @@ from jaxident.diagnosis.preparation.prepare import Prepared
 from jaxident.effects.coordinates import ASIDE, PLACES
 
 VERDICTS = ("no_gap", "parameters", "effects", "partly", "unknown", "undecided")
+"""What a diagnosis may come to; studies store its place here."""
 FEW, FEWEST = 6, 2
 """Windows that naming and judging need before anything is claimed."""
 DIFFERENT = 4.0

@@ -3,7 +3,6 @@
 import csv
 import itertools
 import os
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -46,8 +45,8 @@ def write_naming(named: xarray.Dataset, cells: Target, effects: Target) -> list[
     of_effect = ("in_force", "diagnosed", *_with_errors(OF_EFFECT))
     every = named.assign({name: named[name].broadcast_like(named["share_named"]) for name in ("in_force", "diagnosed")})
     worth = every["in_force"] | (every["share_named"] > 0.0)
-    _write_rows(named, keys, whole, cells, lambda at: True)
-    _write_rows(every, (*keys, "catalogue"), of_effect, effects, lambda at: bool(worth.sel(at)))
+    _write_rows(named, keys, whole, cells, xarray.ones_like(named["right"], bool))
+    _write_rows(every, (*keys, "catalogue"), of_effect, effects, worth)
     return [os.fspath(cells), os.fspath(effects)]
 
 
@@ -55,14 +54,15 @@ def _with_errors(names: tuple[str, ...]) -> list[str]:
     return [each for name in names for each in (name, f"{name}_se")]
 
 
-def _write_rows(table: xarray.Dataset, keys, columns, path: Target, kept: Callable[[dict[str, Any]], bool]) -> None:
+def _write_rows(table: xarray.Dataset, keys, columns, path: Target, kept: xarray.DataArray) -> None:
     """Rows of a dataset by the entries of some axes, those that are kept."""
+    chosen = kept.transpose(*keys).values.ravel()
     values = {name: table[name].transpose(*keys).values.ravel() for name in columns}
     with writing_text(path) as stream:
         out = csv.writer(stream, lineterminator="\n")
         out.writerow(["named_effect" if key == "catalogue" else key for key in keys] + list(columns))
         for row, key in enumerate(itertools.product(*(table[key].values for key in keys))):
-            if kept(dict(zip(keys, key, strict=True))):
+            if chosen[row]:
                 out.writerow([*map(_text, key), *(_text(values[name][row]) for name in columns)])
 
 

@@ -90,10 +90,10 @@ class Finding(NamedTuple):
 
 def find_effects(prepared: Prepared, without: Collection[str] = (), law: Law | None = None) -> tuple[Prepared, Finding]:
     """The search on prepared windows, and these with the commands that arrived where some were lost. `without`: effects
-    that the catalogue is to lack. A noise law that is given stays as it is. Where the robot without effects coasts, its
-    rates are held, and the search is made again."""
+    that the catalogue is to lack. A noise law that is given, that of a simulator, stays as it is. Where a robot without
+    effects coasts, its rates are held, and the search is made again."""
     found = search(prepared.windows, prepared.nominal, without, law)
-    while np.any(found.coasting):
+    while law is None and np.any(found.coasting):
         windows, nominal = hold_rates(prepared.windows, found.coasting)
         prepared = prepared._replace(windows=windows, nominal=nominal)
         found = search(windows, nominal, without, law)

@@ -87,7 +87,7 @@ def search(windows: Windows, nominal: Solution, without: Collection[str] = (), l
     wheel = first_noise(nominal.linear.rims, np.exp(nominal.vector[:2]), windows)
     law = first_law(windows)._replace(wheel=wheel) if law is None else law
     ends = [climb(windows, nominal, begin, law, without, sized)]
-    if np.any(ends[0].coasting):
+    if sized and np.any(ends[0].coasting):
         return ends[0]
     if sized and (ends[0].rest.terms or ends[0].worse_than_none):
         responses = respond(np.exp(nominal.vector[:2]), nominal.linear.residual, windows)

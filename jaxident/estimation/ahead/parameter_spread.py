@@ -13,7 +13,7 @@ from jaxident.robot.model import Model, require_physical
 
 STEP = 1e-4
 """Part of a parameter's size, or of its deviation if that is smaller, by which a robot is moved."""
-NOTHING = 1e-6
+NO_SIZE = 1e-6
 """Below which a parameter says nothing of its size, in its own unit."""
 
 
@@ -50,7 +50,7 @@ def _sizes(names: list[str], values: Array) -> np.ndarray:
     kinds = [name if name.count(".") == 1 else name.replace(".", "_").rsplit("_", 1)[0] for name in names]
     largest = {kind: max(abs(v) for k, v in zip(kinds, values, strict=True) if k == kind) for kind in kinds}
     sizes = np.array([max(largest[kind], _clear(kind)) for kind in kinds])
-    return np.where(sizes > NOTHING, sizes, np.inf)
+    return np.where(sizes > NO_SIZE, sizes, np.inf)
 
 
 def _clear(kind: str) -> float:
