@@ -16,6 +16,7 @@ from jaxident.diagnosis.causes.chance_effects import direct_effects, direct_evid
 from jaxident.diagnosis.causes.finding import CLAIMED, Finding, find_effects
 from jaxident.diagnosis.decide import Parameter, advice, compare_parameters, decide
 from jaxident.diagnosis.detectability import Replay, answers, replay, visible
+from jaxident.diagnosis.fit.prior import held_rates
 from jaxident.diagnosis.posterior import Judgement, judge
 from jaxident.diagnosis.preparation.prepare import Prepared, prepare, suspected_wheels
 from jaxident.diagnosis.preparation.translate import to_model
@@ -27,10 +28,13 @@ from jaxident.log import Log, join
 from jaxident.numerics import require_float64
 from jaxident.robot.model import Model
 
+_COASTS = "the poses ask for a robot that coasts, whatever it is told, and such a robot predicts nothing; "
+_WHEELS = "; wheel speeds would tell them"
 COASTED = (
-    "the poses ask for a robot that coasts, whatever it is told, and such a robot predicts nothing; robots answer "
-    f"within seconds: rates are held at {RATE:g} 1/s, without coupling; wheel speeds would tell them"
+    f"{_COASTS}robots answer within seconds: rates are held at {RATE:g} 1/s, without coupling{_WHEELS}",
+    f"{_COASTS}rates and couplings are held at those of the model that was given{_WHEELS}",
 )
+"""Lines where rates are held, without a given nominal model and with one."""
 
 
 class Diagnosis(NamedTuple):
@@ -188,7 +192,8 @@ def see(prepared: Prepared, finding: Finding, simulator: Simulator | None, model
 
 def suspicions_of(log: Log, prepared: Prepared) -> tuple[str, ...]:
     """What a log says against itself, its wheel speeds against its poses, and its poses against any robot."""
-    return (*log_suspicions(log), *suspected_wheels(log), *([COASTED] if any(prepared.windows.held) else []))
+    held = [COASTED[prepared.told is not None]] if held_rates(prepared.windows) else []
+    return (*log_suspicions(log), *suspected_wheels(log), *held)
 
 
 def check_nominal(logs: Log | Sequence[Log], sim: Log | Sequence[Log] | None, model: Model | None) -> None:

@@ -23,8 +23,8 @@ def details(found: Diagnosis) -> str:
     named = found.verdict in ("effects", "partly")
     own = f"{_due(found)}{_resized(found)}{_doubt(found)}" if named else ""
     refused = f" {told}" if (told := refusal(found)) else ""
-    held = f" {COASTED[0].upper()}{COASTED[1:]}." if COASTED in found.suspicions else ""
-    return f"{own}{refused}{held}".strip()
+    held = [f" {line[0].upper()}{line[1:]}." for line in found.suspicions if line in COASTED]
+    return f"{own}{refused}{''.join(held)}".strip()
 
 
 def headline(found: Diagnosis) -> str:

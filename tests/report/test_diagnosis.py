@@ -260,7 +260,7 @@ def test_laws_that_explain_nearly_as_much_are_named():
 
 
 def test_rates_that_are_no_measurement_are_told():
-    told = lead(made_up("unknown")._replace(suspicions=(COASTED,)))
+    told = lead(made_up("unknown")._replace(suspicions=(COASTED[0],)))
     assert "rates are held at 3 1/s" in told
     assert "coast" not in lead(made_up("unknown"))
 

@@ -94,7 +94,7 @@ def find_effects(prepared: Prepared, without: Collection[str] = (), law: Law | N
     effects coasts, its rates are held, and the search is made again."""
     found = search(prepared.windows, prepared.nominal, without, law)
     while law is None and np.any(found.coasting):
-        windows, nominal = hold_rates(prepared.windows, found.coasting)
+        windows, nominal = hold_rates(prepared.windows, found.coasting, prepared.told)
         prepared = prepared._replace(windows=windows, nominal=nominal)
         found = search(windows, nominal, without, law)
     if found.lost is not None:

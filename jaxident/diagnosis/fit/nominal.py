@@ -13,6 +13,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxident.array_types import Array
+from jaxident.diagnosis.fit.prior import HOLDS, MIDDLE
 from jaxident.diagnosis.fit.refit import Data, Solution, refit
 from jaxident.diagnosis.motion.linear import START_STATES
 from jaxident.diagnosis.motion.responses import respond
@@ -23,7 +24,7 @@ from jaxident.effects.coordinates import neutral_vector, nominal_vector
 from jaxident.errors import InputError
 from jaxident.estimation.poses.maximum_likelihood import begin
 from jaxident.estimation.poses.noise_law import CLEAR
-from jaxident.estimation.poses.prior import RATE, SIGNS, SLOWEST_ROBOT
+from jaxident.estimation.poses.prior import SIGNS, SLOWEST_ROBOT
 from jaxident.estimation.poses.runs import pad_rows, stack_runs
 from jaxident.log import Log, join
 from jaxident.robot.drive import Physical
@@ -71,7 +72,8 @@ def steady_point(windows: Windows) -> np.ndarray:
         speeds.append(np.array([along, theta[-1] - theta[0]]) / step.sum())
         commands.append(step @ np.nan_to_num(sent) / step.sum())
     answers = np.linalg.lstsq(np.array(commands), np.array(speeds), rcond=None)[0].T
-    rate = np.where(windows.held, RATE, SETTLES / float(np.median(windows.step.sum(axis=0))))
+    held, free = windows.held[:2], SETTLES / float(np.median(windows.step.sum(axis=0)))
+    rate = np.where(np.isfinite(held), np.exp(np.nan_to_num(held)), free)
     return nominal_vector(Physical(rate, rate[:, None] * answers), np.zeros(2))
 
 
@@ -89,9 +91,12 @@ def coasts(fit: Solution, windows: Windows, unexplained: bool) -> np.ndarray:
     return slow & (unexplained | ~driven)
 
 
-def hold_rates(windows: Windows, coasting: Array) -> tuple[Windows, Solution]:
-    """The windows with rates held where a robot coasts (2,), and the nominal fit to them."""
-    windows = windows._replace(held=tuple(np.array(windows.held) | coasting))
+def hold_rates(windows: Windows, coasting: Array, told: Array | None) -> tuple[Windows, Solution]:
+    """The windows with rates held where a robot coasts (2,), and both couplings, and the nominal fit to them. told
+    (10,): the coordinates of a given nominal model, where they are held then."""
+    held, middle = np.array(windows.held), MIDDLE if told is None else np.asarray(told)[HOLDS]
+    chosen = np.array([*coasting, True, True])
+    windows = windows._replace(held=np.where(chosen, middle, held))
     return windows, lower_valley(rough_fit(windows, neutral_vector(steady_point(windows))), windows)
 
 

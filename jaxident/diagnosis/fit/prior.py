@@ -9,8 +9,8 @@ is that of a line, between -90 and 90 degrees: a robot whose commands or whose c
 likely.
 
 Every window has start speeds of its own, and a robot that coasts keeps them: it fits nearly any motion and predicts
-none. Where the windows ask for such a robot (`nominal.coasts`), its rates are held at what robots have, without
-coupling, as `identify` holds them.
+none. Where the windows ask for such a robot (`nominal.coasts`), its rates and couplings are held: as a given nominal
+model has them or, as `identify` does, at what robots have, without coupling.
 """
 
 import numpy as np
@@ -26,17 +26,17 @@ GAINS = [(NOMINAL.index(f"gain_{channel}1"), NOMINAL.index(f"gain_{channel}2")) 
 """Places of both gains of each channel."""
 _SIGNS = (1.0, -1.0)
 HOLDS = [NOMINAL.index(name) for name in ("rate_1", "rate_2", "coupling_1", "coupling_2")]
-"""Places of what the prior may hold."""
+"""Places of what may be held."""
 FIRMLY = 1e6
 """Weight on the departure of what is held. At 1e4 a log that shows another rate clearly moved one by 1.6 %."""
-_MIDDLE = np.array([np.log(RATE), np.log(RATE), 0.0, 0.0])
+MIDDLE = np.array([np.log(RATE), np.log(RATE), 0.0, 0.0])
 _WIDTH = np.array([RATE_SPREAD, RATE_SPREAD, RATE * HALF_TRACK, RATE / HALF_TRACK])
 """Middle and deviation of each of them under the prior of `estimation.poses.prior`."""
 
 
 def departures(vector: Array, windows: Windows) -> tuple[np.ndarray, np.ndarray]:
     """How far a vector (SIZE,) departs from what is known, in deviations (6,), and the derivatives by the nominal
-    coordinates (6, 10): the gains of both channels from equal wheels, and what is held from the prior's middle."""
+    coordinates (6, 10): the gains of both channels from equal wheels, and what is held from where it is held."""
     away, slopes = np.zeros(2 + len(HOLDS)), np.zeros((2 + len(HOLDS), len(NOMINAL)))
     for channel, ((right, left), sign) in enumerate(zip(GAINS, _SIGNS, strict=True)):
         one, other = vector[right], sign * vector[left]
@@ -44,26 +44,21 @@ def departures(vector: Array, windows: Windows) -> tuple[np.ndarray, np.ndarray]
         away[channel] = (angle - np.pi * np.round(angle / np.pi)) / SPREAD
         square = max(one**2 + other**2, 1e-12)
         slopes[channel, [right, left]] = np.array([-other, sign * one]) / square / SPREAD
-    weight = np.where(holds(windows), FIRMLY, 0.0) / _WIDTH
-    away[2:] = weight * (vector[HOLDS] - _MIDDLE)
+    weight = np.where(np.isfinite(windows.held), FIRMLY, 0.0) / _WIDTH
+    away[2:] = weight * (vector[HOLDS] - np.nan_to_num(windows.held))
     slopes[np.arange(2, 2 + len(HOLDS)), HOLDS] = weight
     return away, slopes
 
 
-def holds(windows: Windows) -> np.ndarray:
-    """Which coordinates (4,) of HOLDS are the prior's in some windows: rates that are held, and then both couplings."""
-    return np.array([*windows.held, *[any(windows.held)] * 2])
+def held_rates(windows: Windows) -> tuple[str, ...]:
+    """Names of the rates that are held in some windows."""
+    return tuple(name for name, value in zip(NOMINAL[:2], windows.held, strict=False) if np.isfinite(value))
 
 
-def from_prior(windows: Windows) -> tuple[str, ...]:
-    """Names of the parameters whose values are the prior's in some windows."""
-    return tuple(NOMINAL[place] for place, own in zip(HOLDS, windows.held, strict=False) if own)
-
-
-def at_middle(vector: Array, windows: Windows) -> np.ndarray:
-    """A vector (SIZE,) with what is held exactly at the prior's middle, next to which a fit ends."""
+def as_held(vector: Array, windows: Windows) -> np.ndarray:
+    """A vector (SIZE,) with what is held exactly where it is held, next to which a fit ends."""
     found = np.array(vector, float)
-    found[HOLDS] = np.where(holds(windows), _MIDDLE, found[HOLDS])
+    found[HOLDS] = np.where(np.isfinite(windows.held), windows.held, found[HOLDS])
     return found
 
 
@@ -82,9 +77,8 @@ def with_prior(products: Array, vector: Array, windows: Windows) -> np.ndarray:
 
 def as_uncertain_as_prior(covariance: Array, windows: Windows) -> np.ndarray:
     """A covariance (n, n), the nominal coordinates first, in which rates that are held are as uncertain as the prior
-    says, and all else as much more as it answers to that. Couplings that are held stay at zero: such a model has none.
-    """
-    chosen = np.flatnonzero(windows.held)
+    says, and all else as much more as it answers to that. Couplings that are held are certain."""
+    chosen = np.flatnonzero(np.isfinite(windows.held[:2]))
     if not len(chosen):
         return covariance
     places = np.array(HOLDS)[chosen]

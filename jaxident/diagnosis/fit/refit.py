@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.fit.prior import GAINS, as_uncertain_as_prior, unlikeliness, with_prior
+from jaxident.diagnosis.fit.prior import GAINS, as_held, as_uncertain_as_prior, unlikeliness, with_prior
 from jaxident.diagnosis.motion.linear import Linear, follow, gram, linearise, normal
 from jaxident.diagnosis.motion.rims import Rims, rim_speeds
 from jaxident.diagnosis.motion.windows import Windows
@@ -96,6 +96,7 @@ def refit(data: Data, vector: Array, starts: Array, effects: tuple[str, ...], ho
             damping *= 10.0
             if damping > 1e6:
                 break
+    vector = as_held(vector, data.windows)
     return Solution(vector, starts, places, linear, cost, covariance_from(products, places, data.windows), step_number)
 
 

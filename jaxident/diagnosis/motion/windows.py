@@ -11,6 +11,7 @@ from jaxident.log import Log, join, run_begins
 
 SMALLEST = 8
 """Poses that a window needs: fewer say nothing beyond its start state."""
+FREE = np.full(4, np.nan)
 
 
 class Windows(NamedTuple):
@@ -20,7 +21,8 @@ class Windows(NamedTuple):
     command (rows of a piece, pieces, 2). step (rows, windows) [s]: from each row to the next; pose (rows, windows, 3);
     seen (rows, windows); run (windows,): of which piece; first (windows,): its first row there; row (windows,): in
     the log. wheels (rows, windows, 2) [rad/s], turning (rows, windows): wheel speeds, and where both were measured;
-    None in logs without. held (2,): whether a speed's rate is the prior's (`fit.prior`), not the windows'.
+    None in logs without. held (4,): where the search holds the coordinates of `fit.prior.HOLDS`, NaN what it finds
+    itself.
     """
 
     t: Any
@@ -34,7 +36,7 @@ class Windows(NamedTuple):
     row: Any
     wheels: Any = None
     turning: Any = None
-    held: Any = (False, False)
+    held: Any = FREE
 
 
 class Piece(NamedTuple):

@@ -47,6 +47,7 @@ class Prepared(NamedTuple):
     naming: the same of the rows that fit, in the log `fitted` of these alone.
     nominal: the nominal fit. lost: the share of commands that never arrived, and the gain of
     saying so; the windows' commands are then those that did, those `sent` (rows of a piece, pieces, 2) are kept.
+    told (10,): the coordinates of a nominal model that was given, None without.
     """
 
     log: Log
@@ -61,6 +62,7 @@ class Prepared(NamedTuple):
     nominal: Solution
     lost: tuple[float, float] = (0.0, 0.0)
     sent: Any = None
+    told: Any = None
 
 
 def prepare(
@@ -95,7 +97,7 @@ def prepare(
     vector = neutral_vector(starting_point(fitted, pieces) if nominal is None else nominal)
     first = rough_fit(windows, vector, law)
     found = Prepared(given, largest, windows, judging, naming, only(given, pieces), rows, horizon,
-                     Frames(frozen, frozen), first)  # fmt: skip
+                     Frames(frozen, frozen), first, told=nominal)  # fmt: skip
     if law is not None:
         return found
     outlying, windows, first = without_outliers(fitted, windows, first, pieces)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.fit.prior import at_middle, from_prior
+from jaxident.diagnosis.fit.prior import held_rates
 from jaxident.diagnosis.fit.refit import Solution
 from jaxident.diagnosis.noise.law import Law, deviations
 from jaxident.diagnosis.preparation.prepare import Prepared
@@ -94,7 +94,7 @@ def to_model(
 ) -> Model:
     """Coordinates (SIZE,) as a model with its noise law and effects, `direct` ones by their parameters; with the
     deviations and the covariance of a fit where one is given. Limits that never act are left out."""
-    vector = at_middle(vector, prepared.windows)
+    held = held_rates(prepared.windows) if prepared.told is None else ()
     values = in_user_units(vector, prepared.largest)
     steps = np.concatenate([np.diff(run.t) for run in prepared.log.runs()])
     found = [_effect(name, vector, prepared.largest, fit) for name in effects]
@@ -109,7 +109,7 @@ def to_model(
         effects=tuple(found),
         covariance=covariance,
         parameter_order=order,
-        provenance=with_session(Provenance(method="diagnosis", from_prior=from_prior(prepared.windows)), prepared.log),
+        provenance=with_session(Provenance(method="diagnosis", from_prior=held), prepared.log),
     )
 
 

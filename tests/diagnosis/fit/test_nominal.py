@@ -84,8 +84,8 @@ def test_a_rate_that_is_held_is_the_priors_and_as_uncertain():
     free = windows_of(25)
     data = Data(free, white_whitener(LAW, free))
     found = refit(data, neutral_vector(steady_point(free)), first_starts(free), ())
-    windows, _ = hold_rates(free, np.array([False, True]))
-    assert windows.held == (False, True)
+    windows, _ = hold_rates(free, np.array([False, True]), None)
+    np.testing.assert_array_equal(windows.held, [np.nan, np.log(RATE), 0.0, 0.0])
     held = refit(data._replace(windows=windows), found.vector, found.starts, (), most=60)
     assert np.exp(held.vector[1]) == pytest.approx(RATE, rel=1e-4)
     assert held.vector[8:10] == pytest.approx([0.0, 0.0], abs=1e-4)
@@ -94,3 +94,11 @@ def test_a_rate_that_is_held_is_the_priors_and_as_uncertain():
     assert slower == pytest.approx(steady, rel=0.1), "the steady turn rate is told whatever the rate"
     across = held.covariance[1, 4:6] / held.covariance[1, 1]
     assert across == pytest.approx(held.vector[4:6], rel=0.2), "a faster robot has larger gains"
+
+
+def test_rates_are_held_as_a_given_model_has_them():
+    told = np.concatenate([np.log([2.0, 4.0]), np.ravel(DRIVE.gain), np.zeros(2), [0.1, 0.3]])
+    windows, fit = hold_rates(windows_of(25), np.array([True, False]), told)
+    np.testing.assert_array_equal(windows.held, [np.log(2.0), np.nan, 0.1, 0.3])
+    assert np.exp(fit.vector[0]) == pytest.approx(2.0, rel=1e-4)
+    assert fit.vector[8:10] == pytest.approx([0.1, 0.3], abs=1e-3)

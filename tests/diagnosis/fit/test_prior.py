@@ -9,7 +9,7 @@ from jaxident.diagnosis.fit.refit import refit
 from jaxident.effects.coordinates import NOMINAL
 
 WINDOWS = windows_of(VECTOR)
-HELD = WINDOWS._replace(held=(True, False))
+HELD = WINDOWS._replace(held=np.array([np.log(3.0), np.nan, 0.0, 0.1]))
 GAINS = slice(NOMINAL.index("gain_11"), NOMINAL.index("gain_22") + 1)
 
 
