@@ -5,7 +5,7 @@ import xarray
 
 from jaxident import plot
 from jaxident.plot.names import plain
-from jaxident.report.page import PHONE, Figure, Section, Table
+from jaxident.report.page import NOTHING, PHONE, Figure, Section, Table
 from jaxident.report.sweep_maps import entry
 from jaxident.study.statistics import cell_axes
 
@@ -106,10 +106,17 @@ def _table(named: xarray.Dataset) -> Table:
     rows = []
     for index in list(np.ndindex(values["right"].shape))[:LISTED]:
         at = {name: float(value[index]) for name, value in values.items()}
-        shares = [f"{100 * at[name]:.0f} ± {100 * at[f'{name}_se']:.0f}" for name in SHARES]
-        wrong = f"{at['false_names']:.2f} ± {at['false_names_se']:.2f}"
+        shares = [_with_error(100 * at[name], 100 * at[f"{name}_se"], 0) for name in SHARES]
+        wrong = _with_error(at["false_names"], at["false_names_se"], 2)
         cell = [entry(named, key, index[keys.index(key)]) for key in told]
         rows.append((*cell, int(at["diagnosed"]), *shares, wrong))
     titles = (*told, "diagnosed", "all named", "right", "or alike", "claimed", "wrong names a trial")
     more = f" The first {LISTED} of {values['right'].size}." if values["right"].size > LISTED else ""
     return Table(titles, rows, f"Shares in per cent, ± one standard error.{more}")
+
+
+def _with_error(value: float, error: float, digits: int) -> str:
+    """A mean with its standard error, which a single trial does not give; a dash for what no trial gives."""
+    if np.isnan(value):
+        return NOTHING
+    return f"{value:.{digits}f}" + ("" if np.isnan(error) else f" ± {error:.{digits}f}")

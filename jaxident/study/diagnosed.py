@@ -64,11 +64,11 @@ def log_of(made: Recording) -> Log:
 
 
 def diagnose_log(log: Log, horizon: float) -> tuple[Finding, Naming]:
-    """The corrected model's parameters with their deviations, and what is named. A log that is refused has no numbers;
-    horizon [s]: 0 for the default."""
+    """The corrected model's parameters with their deviations, and what is named. A log that is refused, or on which the
+    arithmetic ends, has no numbers: it must not end a study of thousands. horizon [s]: 0 for the default."""
     try:
         found = diagnose(log, horizon=horizon or None)
-    except (InputError, WorkError):
+    except (InputError, WorkError, np.linalg.LinAlgError):
         none = np.full(len(DIFFERENCE_ORDER), np.nan)
         return Finding(none, none, REFUSED), NO_NAMING
     return Finding(*parameters_of(found.corrected_model), FOUND), naming_of(found)

@@ -13,6 +13,7 @@ import numpy as np
 import xarray
 
 from jaxident.diagnosis.decide import VERDICTS
+from jaxident.study.estimators import DIAGNOSE
 from jaxident.study.statistics import cell_axes
 
 CLAIMS = tuple(VERDICTS.index(name) for name in ("effects", "partly", "unknown"))
@@ -41,7 +42,8 @@ def naming(trials: xarray.Dataset) -> xarray.Dataset | None:
     """
     if "named" not in trials:
         return None
-    chosen = np.flatnonzero((trials["verdict"] >= 0).any(trials["reason"].dims[:-1]).values)
+    methods = [one["method"] for one in json.loads(trials.attrs["study"])["estimators"]]
+    chosen = [k for k, method in enumerate(methods) if method == DIAGNOSE]
     named, verdict, alike = (trials[name].isel(estimator=chosen).load() for name in ("named", "verdict", "alike"))
     there = in_force(trials)
     seen = verdict >= 0

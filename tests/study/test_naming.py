@@ -100,3 +100,15 @@ def test_the_page_tells_of_names(trials, tmp_path):
     text = (tmp_path / "index.html").read_text()
     assert "told is right in 12 of 15 trials (13 with look-alikes); 3 names are wrong" in text
     assert "What the diagnoses name" in text
+
+
+def test_a_study_whose_logs_were_all_refused_has_a_page(trials, tmp_path):
+    none = trials.copy(deep=True)
+    none["verdict"][:], none["named"][:] = -1, np.nan
+    found = naming(none)
+    assert int(found["diagnosed"].sum()) == 0
+    write_naming(found, tmp_path / "cells.csv", tmp_path / "effects.csv")
+    write_study(STUDY, none, summarise(none), tmp_path / "index.html", found)
+    text = (tmp_path / "index.html").read_text()
+    assert "told is right in 0 of 0 trials" in text
+    assert ">nan" not in text
