@@ -23,6 +23,7 @@ SLOW = (
     "cramer_rao",
     "study",
     "summarise",
+    "naming",
 )
 """They compile an estimator, 10 s and more each."""
 
