@@ -18,8 +18,8 @@ DARK = 0.6
 def name_matrix(
     shares: Any, in_force: Any, *, rows: Sequence[str], columns: Sequence[str], ax: Axes | None = None
 ) -> Axes:
-    """Shares (rows, columns) of trials in which a diagnosis names an effect (columns), where some act (rows): per cent
-    in each field, a frame where the effect is in force. An empty field is zero, or no trial at all."""
+    """Shares (rows, columns), 0 to 1, of trials in which a diagnosis names an effect, by what acts and what is named:
+    per cent in each field, a frame where an effect is in_force (rows, columns). An empty field is zero, or no trial."""
     ax = style.axes_or_new(ax)
     shares = np.asarray(shares, float)
     ax.imshow(shares, cmap=MAP, vmin=0.0, vmax=1.0, aspect="auto")
@@ -40,7 +40,7 @@ def name_matrix(
 def share_curves(
     levels: Any, curves: Mapping[str, tuple[Any, Any]], *, xlabel: str, ylabel: str, ax: Axes | None = None
 ) -> Axes:
-    """Shares of trials with their standard errors (levels,) against the levels of an axis, a line each."""
+    """Shares of trials, 0 to 1, with their standard errors (levels,), by name, against an axis's levels (levels,)."""
     ax = style.axes_or_new(ax)
     levels = np.asarray(levels, float)
     scale_for_levels(ax, levels)

@@ -16,6 +16,8 @@ LEVELS = {
 """Axes of numbers, the first of which with several levels is drawn: what it is called, and the factor of its unit."""
 MOST_LINES, MOST_COLUMNS, MOST_ROWS = 5, 14, 24
 """Of a picture: more cannot be told apart, or read."""
+FEW_COLUMNS = 6
+"""Of a picture that a phone shows whole."""
 SHARES = ("all_named", "right", "right_or_alike", "claimed")
 LISTED = 60
 """Rows of the table; naming.csv has all."""
@@ -46,7 +48,9 @@ def naming_lead(named: xarray.Dataset | None) -> str:
     for one in map(str, named["estimator"].values):
         at = named.sel(estimator=one)
         count, weight = int(at["diagnosed"].sum()), at["diagnosed"] / max(int(at["diagnosed"].sum()), 1)
-        right, alike, false = (round(float((at[n] * weight).sum()) * count) for n in (*SHARES[1:3], "false_names"))
+        right, alike, false = (
+            round(float((at[n] * weight).sum()) * count) for n in ("right", "right_or_alike", "false_names")
+        )
         told.append(f"{one} is right in {right} of {count} trials ({alike} with look-alikes); {false} names are wrong")
     return f"{'; '.join(told)}. "
 
@@ -68,7 +72,7 @@ def _matrices(named: xarray.Dataset) -> list[Figure]:
         rows = list(map(plain, named[axis].values))[:MOST_ROWS]
         if not kept:
             continue
-        figure, ax = plot.figure(size=(PHONE if len(kept) <= 6 else 6.3, 1.5 + 0.3 * len(rows)))
+        figure, ax = plot.figure(size=(PHONE if len(kept) <= FEW_COLUMNS else 6.3, 1.5 + 0.3 * len(rows)))
         names = list(map(plain, named["catalogue"].values[kept]))
         plot.name_matrix(shares[:MOST_ROWS, kept], there[:MOST_ROWS, kept], rows=rows, columns=names, ax=ax)
         made.append(Figure(plot.image(figure), f"{one}: share of trials in which each effect is named", CAPTION))

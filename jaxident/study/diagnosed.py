@@ -53,8 +53,9 @@ def with_diagnoses(study: Study, outcome: Outcome, recording: Callable[[int], Re
         for place in study.diagnoses:
             found, naming[trial][place] = diagnose_log(log, settings_of(study.estimators[place])["horizon"])
             estimate[trial, place], deviation[trial, place], reason[trial, place] = found
-    verdict, *of_effects = (np.array(part) for part in zip(*(zip(*row, strict=True) for row in naming), strict=True))
-    return Outcome(estimate, deviation, outcome.truth, reason, verdict.astype("i1"), *of_effects)
+    told = Naming(*(np.array([[one[k] for one in row] for row in naming]) for k in range(len(Naming._fields))))
+    told = told._replace(verdict=told.verdict.astype("i1"))
+    return Outcome(estimate, deviation, outcome.truth, reason, **told._asdict())
 
 
 def log_of(made: Recording) -> Log:

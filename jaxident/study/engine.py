@@ -26,7 +26,7 @@ BLOCK = 50
 """Trials at once on a CPU: so few that their work stays in the cache."""
 
 DIAGNOSED_AT_ONCE = 4
-"""Trials of a chunk where they are diagnosed, about a minute's work: a study that is stopped loses its last chunk."""
+"""Trials of a chunk where they are diagnosed, half a minute's work: a study that is stopped loses its last chunk."""
 
 TRIAL_BYTES, ROW_BYTES = 1e6, 4e3
 """What a graphics card is given for a trial of one estimator, and for each of its rows: on an H200 a whole trial of the

@@ -179,6 +179,10 @@ def _number(low: float, high: float) -> Callable[[Any], bool]:
     return lambda value: not isinstance(value, bool) and isinstance(value, int | float) and low < value <= high
 
 
+def _seconds(value: Any) -> bool:
+    return _number(0.0, 1e3)(value) or (value == 0 and not isinstance(value, bool))
+
+
 _PAPER = {
     "setup_samples": Setting(
         0,
@@ -207,6 +211,6 @@ METHODS = {
     "key-term-least-squares": Method(key_terms, _WHOLE),
     "instrumental-variables": Method(instrumental, _WHOLE),
     BEST: Method(likelihood, _WHOLE | _POSES, alone=True),
-    DIAGNOSE: Method(None, {"horizon": Setting(0.0, _number(-1e-9, 1e3), "0 (the default rule) or seconds")}),
+    DIAGNOSE: Method(None, {"horizon": Setting(0.0, _seconds, "0 (the default rule) or seconds")}),
 }
 """Every estimator by name."""

@@ -27,11 +27,15 @@ def naming(trials: xarray.Dataset) -> xarray.Dataset | None:
         trials: of `jaxident.study`.
 
     Returns:
-        xarray.Dataset: `in_force`, whether an effect acts; `share_named` and mean `takes_part` of each effect; and of
-            each cell the share of trials in which all effects in force are named (`all_named`), in which these are
-            all that is named (`right`), the same with look-alikes (`right_or_alike`), in which anything is claimed
-            (`claimed`), and the mean number of names that are not in force (`false_names`), each with its standard
-            error (`_se`); `diagnosed`: trials that count.
+        xarray.Dataset: axes of the cells, `estimator` (diagnoses alone) and `catalogue` (effects). All numbers are
+            shares or counts.
+            `in_force` (robot, effect where the study has that axis, catalogue): whether an effect acts.
+            `share_named`, `takes_part` (cells, estimator, catalogue): share of trials that name an effect, and its
+            mean probability.
+            (cells, estimator): `diagnosed`, trials that count; and the shares of these in which all effects in force
+            are named (`all_named`), in which nothing else is (`right`), the same with look-alikes (`right_or_alike`),
+            in which anything is claimed (`claimed`); `false_names`, names a trial that are not in force.
+            Each share and mean has its standard error (`_se`).
 
     Examples:
         >>> import jaxident as ji

@@ -24,7 +24,7 @@ from jaxident.effects.coordinates import neutral_vector, nominal_vector
 from jaxident.errors import InputError
 from jaxident.estimation.poses.maximum_likelihood import begin
 from jaxident.estimation.poses.noise_law import CLEAR
-from jaxident.estimation.poses.prior import SIGNS, SLOWEST_ROBOT
+from jaxident.estimation.poses.prior import SIGNS, coasting
 from jaxident.estimation.poses.runs import pad_rows, stack_runs
 from jaxident.log import Log, join
 from jaxident.robot.drive import Physical
@@ -85,17 +85,16 @@ def coasts(fit: Solution, windows: Windows, unexplained: bool) -> np.ndarray:
         return np.zeros(2, bool)
     rate, gain = np.exp(fit.vector[:2]), fit.vector[2:6].reshape(2, 2)
     deviation = np.sqrt(np.diagonal(fit.covariance)[2:6]).reshape(2, 2)
-    slow = (rate < SLOWEST_ROBOT) & (rate * np.max(windows.step.sum(axis=0)) < 1.0)
     signs = np.sign(gain[:, 0] * gain[:, 1]) == np.prod(SIGNS, axis=1)
     driven = signs & np.all(np.abs(gain) > CLEAR * deviation, axis=1)
-    return slow & (unexplained | ~driven)
+    return coasting(rate, float(np.max(windows.step.sum(axis=0))), driven, unexplained)
 
 
-def hold_rates(windows: Windows, coasting: Array, told: Array | None) -> tuple[Windows, Solution]:
-    """The windows with rates held where a robot coasts (2,), and both couplings, and the nominal fit to them. told
-    (10,): the coordinates of a given nominal model, where they are held then."""
+def hold_rates(windows: Windows, which: Array, told: Array | None) -> tuple[Windows, Solution]:
+    """The windows with some rates (2,) and both couplings held, and the nominal fit to them. told (10,): the coordinates
+    of a given nominal model, where they are held then."""
     held, middle = np.array(windows.held), MIDDLE if told is None else np.asarray(told)[HOLDS]
-    chosen = np.array([*coasting, True, True])
+    chosen = np.array([*which, True, True])
     windows = windows._replace(held=np.where(chosen, middle, held))
     return windows, lower_valley(rough_fit(windows, neutral_vector(steady_point(windows))), windows)
 

@@ -190,7 +190,7 @@ def _step(products: Array, now: Array, low: Array, high: Array, damping: float) 
 def covariance_from(products: Array, places: list[int], windows: Windows) -> np.ndarray:
     """Covariance of the free coordinates in `places`, and of what products (n, n) have behind them. No coordinate is
     less certain than WIDE of its sizes: what the runs say nothing of would else have a deviation of 1e90, and a
-    prediction with it. What the prior holds is as uncertain as the prior."""
+    prediction with it. Rates that are held are as uncertain as robots' rates are."""
     whole, own = np.array(products[:-1, :-1]), np.arange(len(places))
     whole[own, own] += (WIDE * sizes()[places]) ** -2.0
     scale = np.sqrt(np.diagonal(whole))

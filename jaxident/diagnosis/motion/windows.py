@@ -12,6 +12,7 @@ from jaxident.log import Log, join, run_begins
 SMALLEST = 8
 """Poses that a window needs: fewer say nothing beyond its start state."""
 FREE = np.full(4, np.nan)
+"""Of windows in which nothing is held."""
 
 
 class Windows(NamedTuple):

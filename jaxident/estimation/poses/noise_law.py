@@ -8,7 +8,7 @@ from jaxident.array_types import Array
 from jaxident.errors import InputError
 from jaxident.estimation.poses.maximum_likelihood import Beginning, Fit, begin, fit_from, numbers_in
 from jaxident.estimation.poses.parameters import Law, names
-from jaxident.estimation.poses.prior import RATE, SIGNS, SLOWEST_ROBOT, Prior, middle_gain, prior_of
+from jaxident.estimation.poses.prior import RATE, SIGNS, Prior, coasting, middle_gain, prior_of
 from jaxident.estimation.poses.residual_tests import whiteness
 from jaxident.estimation.poses.runs import Runs
 
@@ -97,9 +97,8 @@ def coasts(fit: Fit, runs: Runs) -> np.ndarray:
     deviation = np.sqrt(np.diagonal(np.asarray(fit.covariance))[2:6]).reshape(2, 2)
     time = np.cumsum(np.broadcast_to(np.asarray(runs.step), runs.seen.shape), axis=1)
     longest = float(np.max(np.where(np.asarray(runs.seen), time, 0.0)))
-    slow = (rate < SLOWEST_ROBOT) & (rate * longest < 1.0)
     driven = np.all(np.array(SIGNS) * gain > CLEAR * deviation, axis=1)
-    return slow & (~driven | (colour(fit, runs) >= WHITE))
+    return coasting(rate, longest, driven, colour(fit, runs) >= WHITE)
 
 
 def likeliest(tried: list[tuple[Fit, Law]], runs: Runs) -> tuple[Fit, Law]:

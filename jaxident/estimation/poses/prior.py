@@ -58,6 +58,12 @@ class Prior(NamedTuple):
     weight: Any
 
 
+def coasting(rate: Array, seconds: float, driven: Array, doubted: bool) -> np.ndarray:
+    """Which speeds (2,) coast: at a rate [1/s] below nearly all robots', too slow to settle within the longest stretch
+    with a start speed of its own [s], and either in a model that is doubted anyway, or not clearly driven (2,)."""
+    return (rate < SLOWEST_ROBOT) & (rate * seconds < 1.0) & (doubted | ~driven)
+
+
 @jax.jit
 def prior_of(runs: Runs) -> Prior:
     """The prior for runs (runs, rows); pure, maps over trials."""
