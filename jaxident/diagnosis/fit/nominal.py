@@ -91,8 +91,8 @@ def coasts(fit: Solution, windows: Windows, unexplained: bool) -> np.ndarray:
 
 
 def hold_rates(windows: Windows, which: Array, told: Array | None) -> tuple[Windows, Solution]:
-    """The windows with some rates (2,) and both couplings held, and the nominal fit to them. told (10,): the coordinates
-    of a given nominal model, where they are held then."""
+    """The windows with some rates (2,) and both couplings held, and the nominal fit to them. told (10,): coordinates of
+    a given nominal model, where they are held then."""
     held, middle = np.array(windows.held), MIDDLE if told is None else np.asarray(told)[HOLDS]
     chosen = np.array([*which, True, True])
     windows = windows._replace(held=np.where(chosen, middle, held))
