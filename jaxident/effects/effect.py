@@ -193,7 +193,7 @@ class EffectRecord(NamedTuple):
     first parameter to try instead. sharp: it has corners within a sample. varies: it changes while the command is held.
     timed: it goes by session time. extension: beyond the catalogue that this program was asked for. step: its law as
     statements for programs without this package; None where it draws. quantity: what simulators and controllers call
-    it, where one of them has a word for it (`jaxident.export`). kinds: discovered laws (acts on, times, signal) in
+    it, where one of them has a word for it (`jaxident.export`). kinds: discovered laws (acts on, times, signals) in
     whose place it acts, so that one found there may be this effect in another form. poses_only: it acts on the camera's
     clock; wheel speeds are without it, and no log without them is searched for it. All have `search` or `chance`.
     """
@@ -220,7 +220,7 @@ class EffectRecord(NamedTuple):
     extension: bool = False
     step: Step | None = None
     quantity: str = ""
-    kinds: tuple[tuple[str, str, str], ...] = ()
+    kinds: tuple[tuple[str, ...], ...] = ()
     poses_only: bool = False
 
     @property

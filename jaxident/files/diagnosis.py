@@ -1,5 +1,6 @@
 """diagnosis.json, "schema": "jaxident.diagnosis/2": what a diagnosis found, for programs."""
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from jaxident.diagnosis.account.where import OF_COMMANDS, Region
 from jaxident.diagnosis.detectability import Replay
 from jaxident.diagnosis.diagnose import Diagnosis
 from jaxident.effects.catalogue import BY_KIND, CATALOGUE
+from jaxident.effects.discovered import knots_by_signal
 
 SCHEMA = "jaxident.diagnosis/2"
 
@@ -69,21 +71,23 @@ def _in_thousandths(errors: dict[str, tuple[float, float]]) -> dict[str, dict[st
 def _law(shown: Shown) -> dict[str, Any]:
     """One discovered law."""
     law, form = shown.law, shown.form
-    columns = (np.asarray(column, float).tolist() for column in (law.at, law.value, law.standard_deviation))
-    keys = ("at", "value", "standard_deviation")
+    places = itertools.product(*(knots.tolist() for knots in knots_by_signal(law).values()))
+    keys = ("at", *(["second_at"] if law.second_signal else []), "value", "standard_deviation")
+    columns = (np.ravel(np.asarray(column, float)).tolist() for column in (law.value, law.standard_deviation))
+    points = ((*place, *values) for place, *values in zip(places, *columns, strict=True))
     return {
         "site": shown.kind.site,
         "acts_on": law.acts_on,
         "times": law.times,
-        "inputs": [law.signal] if law.times == "1" else [law.signal, law.times],
+        "inputs": [*knots_by_signal(law), *([] if law.times == "1" else [law.times])],
         "memory": None,
-        "curve": [dict(zip(keys, point, strict=True)) for point in zip(*columns, strict=True)],
+        "curve": [dict(zip(keys, point, strict=True)) for point in points],
         "rows": list(shown.density),
         "share": shown.share,
         "p_value": shown.p_value,
         "looks_like": None if form is None else form._asdict(),
         "alike": [kind._asdict() for kind in shown.alike],
-        "effects_there": list(BY_KIND.get(tuple(shown.kind), ())),
+        "effects_there": list(BY_KIND.get(shown.kind.names, ())),
     }
 
 

@@ -138,6 +138,10 @@ def write_effect(effect: Effect) -> dict[str, Any]:
     }
 
 
+SECOND = ("second_signal", "second_at")
+"""Keys of a law that is a surface."""
+
+
 def read_discovered(value: Any, where: str) -> tuple[Discovered, ...]:
     """The discovered laws, each of a kind that this program knows."""
     laws = tuple(_read_law(entry, f"{where}[{k}]") for k, entry in enumerate(take_list(value, where)))
@@ -149,21 +153,26 @@ def read_discovered(value: Any, where: str) -> tuple[Discovered, ...]:
 
 
 def _read_law(value: Any, where: str) -> Discovered:
-    found = take_keys(value, where, ("acts_on", "signal", "at", "value"), ("times", "standard_deviation"))
+    found = take_keys(value, where, ("acts_on", "signal", "at", "value"), ("times", "standard_deviation", *SECOND))
     words = {key: take_text(found[key] or "1", f"{where}.{key}") for key in ("acts_on", "times", "signal")}
-    count = len(take_list(found["at"], f"{where}.at"))
-    at, values = (take_array(found[key], f"{where}.{key}", (count,)) for key in ("at", "value"))
-    spread = found["standard_deviation"]
+    keys, second = ["at"], ""
+    if any(found[key] is not None for key in SECOND):
+        keys, second = ["at", "second_at"], take_text(found["second_signal"], f"{where}.second_signal")
+    shape = tuple(len(take_list(found[key], f"{where}.{key}")) for key in keys)
+    knots = [take_array(found[key], f"{where}.{key}", (count,)) for key, count in zip(keys, shape, strict=True)]
+    values, spread = take_array(found["value"], f"{where}.value", shape), found["standard_deviation"]
     if spread is not None:
-        spread = take_array(spread, f"{where}.standard_deviation", (count,), least=0.0, gaps=True)
-    return Discovered(**words, at=at, value=values, standard_deviation=spread)
+        spread = take_array(spread, f"{where}.standard_deviation", shape, least=0.0, gaps=True)
+    return Discovered(**words, at=knots[0], value=values, standard_deviation=spread, second_signal=second,
+                      second_at=knots[1] if second else None)  # fmt: skip
 
 
 def write_discovered(law: Discovered) -> dict[str, Any]:
-    """What a law acts on, its signal and its curve."""
+    """What a law acts on, its signals and its curve or surface."""
     words = {"acts_on": law.acts_on, "times": law.times, "signal": law.signal}
     curve = {"at": to_lists(law.at), "value": to_lists(law.value)}
-    return {**words, **curve, "standard_deviation": write_deviations(law.standard_deviation)}
+    second = {"second_signal": law.second_signal, "second_at": to_lists(law.second_at)} if law.second_signal else {}
+    return {**words, **curve, **second, "standard_deviation": write_deviations(law.standard_deviation)}
 
 
 def read_spread(value: Any, where: str) -> Spread:

@@ -28,7 +28,7 @@ _HOMES = {
     "gap_map": "diagnosis",
     "ranking": "diagnosis",
     "shrinks": "diagnosis",
-    "discovered": "diagnosis",
+    "discovered": "laws",
     "estimate_errors": "studies",
     "error_sizes": "studies",
     "break_down": "studies",

@@ -11,7 +11,6 @@ from matplotlib.ticker import LogLocator
 
 from jaxident.plot import style
 from jaxident.plot.studies import BRIGHT, MAP
-from jaxident.robot.model import Discovered
 
 DECADES = 20.0
 """Gains whose largest is beyond this many times the smallest are drawn on a logarithmic axis."""
@@ -210,24 +209,3 @@ def _ends(edges: Any) -> list[str]:
 def _short(value: float) -> str:
     whole = abs(value) >= 100.0
     return f"{0.0 if abs(value) < 1e-9 else value:{'.0f' if whole else '.2g'}}".replace("-", "\N{MINUS SIGN}")
-
-
-def discovered(
-    law: Discovered, density: Sequence[int] | None = None, *, xlabel: str = "", ylabel: str = "", ax: Axes | None = None
-) -> Axes:
-    """The curve of a discovered law with a band of two standard deviations; density: how many rows of the logs lie
-    nearest to each knot, grey bars below."""
-    ax = style.axes_or_new(ax, (style.WIDTH, 2.2))
-    at, value = np.asarray(law.at, float), np.asarray(law.value, float)
-    ax.axhline(0.0, color=style.GREY, linewidth=style.THIN)
-    if law.standard_deviation is not None:
-        spread = 2.0 * np.asarray(law.standard_deviation, float)
-        ax.fill_between(at, value - spread, value + spread, color=style.BLUE, alpha=0.2, linewidth=0.0)
-    ax.plot(at, value, color=style.BLUE, linewidth=1.5 * style.LINE, marker="o", markersize=3.0)
-    if density is not None and max(density, default=0) > 0:
-        low, high = ax.get_ylim()
-        height = 0.15 * (high - low) * np.asarray(density, float) / max(density)
-        ax.bar(at, height, width=0.8 * np.diff(at).mean(), bottom=low, color=style.PALE, zorder=0)
-        ax.set_ylim(low, high)
-    ax.set(xlabel=xlabel or law.signal, ylabel=ylabel or law.acts_on)
-    return ax

@@ -20,14 +20,18 @@ SIGNAL_WORDS = {
 TIMES_WORDS = {"1": "", "v": "speed times ", "w": "turn rate times "}
 SEEN = (
     "These laws are in no catalogue. They were found on the runs that fit, and runs that took no part in that confirm "
-    "them. Each adds a curve of one signal at one place. The corrected model has them; `predict`, `simulate`, `plan` "
-    "and studies run them. Beyond the signals that these logs show, a curve stays at its last value. That is a guess, "
-    "and `predict` warns where it is made."
+    "them. Each adds a curve of one signal, or a surface of two, at one place. The corrected model has them, and "
+    "`predict`, `simulate`, `plan` and studies run them. Beyond the signals that these logs show, a law stays at its "
+    "last value. That is a guess, and `predict` warns where it is made."
 )
-CAPTION = (
-    "Line: the curve; shade: two standard deviations; grey bars: how often the robot was there. A straight line that "
-    "the nominal model could have as well (in its rates and gains) is taken away; the shade still has its doubt."
+OF_CURVE = "Line: the curve; shade: two standard deviations; grey bars: how often the robot was there. "
+OF_MAP = (
+    "Colour: the surface; dots: its knots, larger where the robot was more often, hollow where the value is less than "
+    "two standard deviations from 0. "
 )
+REST = "What the nominal model could have as well (in its rates and gains) is taken away; its doubt is not."
+HEIGHT, MAP_HEIGHT = 2.1, 4.2
+"""Of the picture of a curve and of a map [in]."""
 
 
 def sentence(shown: Shown) -> str:
@@ -42,37 +46,43 @@ def _like(shown: Shown) -> str:
     if form is None:
         return ""
     values = ", ".join(f"{key} = {number(value)}" for key, value in form.parameters.items())
-    return f" ({percent(form.part_explained)} of it is {form.form} with s = {shown.law.signal}, {values})"
+    law = shown.law
+    named = f"s = {law.signal}, " + (f"t = {law.second_signal}, " if law.second_signal else "")
+    return f" ({percent(form.part_explained)} of it is {form.form} with {'' if 'x0' in values else named}{values})"
 
 
 def discovered(found: Diagnosis) -> list[Section]:
     """The section on discovered laws; none where there are none."""
     if not found.discovered:
         return []
-    count = len(found.discovered)
-    figure, axes = plot.figure(size=(6.3, 2.1 * count), rows=count)
-    for ax, shown in zip(axes if count > 1 else [axes], found.discovered, strict=True):
-        law = shown.law
-        factor = {"1": "", "v": " per m/s", "w": " per rad/s"}[law.times]
-        unit = f"{ACTS[law.acts_on]}{factor}"
-        told = dataclasses.replace(law, value=beyond(law, shown.density))
-        plot.discovered(told, shown.density, ax=ax, xlabel=f"{SIGNAL_WORDS[law.signal]} [{SIGNALS[law.signal]}]",
-                        ylabel=f"{law.acts_on}\n[{unit}]")  # fmt: skip
     rows = [
         (shown.law.acts_on, _words(shown.kind),
          percent(shown.share), f"{shown.p_value:.2g}", _form(shown))
         for shown in found.discovered
     ]  # fmt: skip
     table = Table(("acts on", "what is added", "share of the error", "probability by chance", "looks like"), rows)
-    picture = Figure(plot.image(figure), "Discovered curves", CAPTION)
-    return [Section("What was discovered", [SEEN, picture, table, *_other_forms(found), *_alike(found)])]
+    pictures = [_picture(shown) for shown in found.discovered]
+    return [Section("What was discovered", [SEEN, *pictures, table, *_other_forms(found), *_alike(found)])]
+
+
+def _picture(shown: Shown) -> Figure:
+    """The curve or the map of one law."""
+    law = shown.law
+    surface = bool(law.second_signal)
+    figure, ax = plot.figure(size=(6.3, MAP_HEIGHT if surface else HEIGHT))
+    factor = {"1": "", "v": " per m/s", "w": " per rad/s"}[law.times]
+    told = dataclasses.replace(law, value=beyond(law, shown.density))
+    plot.discovered(told, shown.density, ax=ax, xlabel=f"{SIGNAL_WORDS[law.signal]} [{SIGNALS[law.signal]}]",
+                    ylabel=f"{law.acts_on}\n[{ACTS[law.acts_on]}{factor}]")  # fmt: skip
+    caption = (OF_MAP if surface else OF_CURVE) + REST
+    return Figure(plot.image(figure), _place(shown.kind), caption)
 
 
 def _other_forms(found: Diagnosis) -> list[str]:
     """A line for each law that may be an effect of the catalogue in another form."""
     lines = []
     for shown in found.discovered:
-        names = BY_KIND.get(tuple(shown.kind), ())
+        names = BY_KIND.get(shown.kind.names, ())
         if names:
             told = together(map(plain, names), "or")
             lines.append(f"{_place(shown.kind)}: this may be {told} in another form than the catalogue's.")
@@ -95,7 +105,10 @@ def _place(kind: Kind) -> str:
 
 
 def _words(kind: Kind) -> str:
-    return f"{TIMES_WORDS[kind.times]}a curve of the {SIGNAL_WORDS[kind.signal]}"
+    shape = f"a curve of the {SIGNAL_WORDS[kind.signal]}"
+    if kind.second_signal:
+        shape = f"a surface of the {SIGNAL_WORDS[kind.signal]} and the {SIGNAL_WORDS[kind.second_signal]}"
+    return f"{TIMES_WORDS[kind.times]}{shape}"
 
 
 def _form(shown: Shown) -> str:

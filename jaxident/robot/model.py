@@ -66,10 +66,12 @@ class Effect:
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class Discovered:
-    """A law in no catalogue that logs showed: `acts_on` gets `times` ("1", "v" or "w") times a curve of a signal.
+    """A law in no catalogue that logs showed: `acts_on` gets `times` ("1", "v" or "w") times a curve of a signal, or
+    times a surface of two.
 
     at, value (knots,): the curve, straight between the knots and constant beyond; standard_deviation (knots,) of its
-    values, or None. Kinds, signals and units: `effects.discovered`.
+    values, or None. A surface has a second_signal, second_at (second knots,) and values (knots, second knots). Kinds,
+    signals and units: `effects.discovered`.
     """
 
     acts_on: str = dataclasses.field(metadata={"static": True})
@@ -78,6 +80,8 @@ class Discovered:
     at: Any
     value: Any
     standard_deviation: Any = None
+    second_signal: str = dataclasses.field(default="", metadata={"static": True})
+    second_at: Any = None
 
 
 @jax.tree_util.register_dataclass

@@ -160,7 +160,10 @@ def _parts(model: Any) -> dict[str, Any]:
 
 def _law(law: Discovered) -> dict[str, Any]:
     kind = {"acts_on": law.acts_on, "times": law.times, "signal": law.signal}
-    return kind | {"at": np.asarray(law.at, float).tolist(), "value": np.asarray(law.value, float).tolist()}
+    curve = {"at": np.asarray(law.at, float).tolist(), "value": np.asarray(law.value, float).tolist()}
+    if not law.second_signal:
+        return kind | curve
+    return kind | curve | {"second_signal": law.second_signal, "second_at": np.asarray(law.second_at, float).tolist()}
 
 
 def _sizes(effects: Sequence[Effect]) -> dict[str, dict[str, float]]:

@@ -217,5 +217,6 @@ def _sensors(models: Sequence[Model], robot: np.ndarray) -> WheelSensor:
 
 def _laws(models: Sequence[Model], robot: np.ndarray) -> Laws:
     """Discovered laws of trials (trials, laws, ...) whose places among the robots are given."""
-    each = [laws_of(model.discovered or (IDLE,)) for model in models]
+    surfaces = any(law.second_signal for model in models for law in model.discovered)
+    each = [laws_of(model.discovered or (IDLE,), surfaces=surfaces) for model in models]
     return Laws(*(np.stack(leaves)[robot] for leaves in zip(*each, strict=True)))

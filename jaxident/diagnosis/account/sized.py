@@ -51,11 +51,11 @@ def _covariance(bending: Bending, model: Model, largest: float) -> tuple[tuple[s
     """Names and covariance of a model's parameters and its curves' values, in the user's units."""
     effects = [effect for effect in model.effects if effect.name in COORDINATES]
     names, slope = slopes_of(bending.fit, effects, largest)
-    units = [largest if ACTS[curve.kind.acts_on] == UNIT else 1.0 for curve in bending.curves for _ in curve.at]
+    units = [largest if ACTS[curve.kind.acts_on] == UNIT else 1.0 for curve in bending.curves for _ in curve.value]
     own, (rows, columns) = len(units), slope.shape
     whole = np.zeros((rows + own, columns + own))
     whole[:rows, :columns], whole[rows:, columns:] = slope, np.diag(units)
-    values = [value_name(k, knot) for k, curve in enumerate(bending.curves) for knot in range(len(curve.at))]
+    values = [value_name(k, knot) for k, curve in enumerate(bending.curves) for knot in range(len(curve.value))]
     return (*names, *values), whole @ bending.covariance @ whole.T
 
 

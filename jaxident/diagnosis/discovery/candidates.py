@@ -1,6 +1,7 @@
 """Laws that could be discovered: where they act, what they depend on, and how the poses answer to each piece of curve.
 
-A curve is a sum of hats, one at each knot. Columns are answers of the poses to the hats, linear about a fitted path.
+A curve is a sum of hats, one at each knot; a surface one of products of hats, row by row. Columns are answers of the
+poses to these, linear about a fitted path.
 """
 
 from collections.abc import Iterator
@@ -17,6 +18,8 @@ from jaxident.effects.discovered import AHEAD, ALONG, BY_CAMERA, HEADING, LEFT, 
 
 KNOTS = 10
 """Of a curve. No other number was tried."""
+SECOND_KNOTS = 8
+"""Of a surface along each of its signals. No other number was tried."""
 INSIDE = (0.01, 0.99)
 """Quantiles of a signal between which its knots lie. No others were tried."""
 VARIED = 1e-6
@@ -29,12 +32,22 @@ SITE_OF_SIGNAL = {
 """The site of a law that acts on accelerations or pushes, by its signal."""
 
 
+FLOOR = ((ALONG, "1"), (ALONG, "v"), (HEADING, "1"), (HEADING, "w"), (SIDEWAYS, "v"), (TURN, "1"))
+"""What may differ from place to place on the floor: slope, rolling, twist, turning, drift, and the camera's heading."""
+
+
 class Kind(NamedTuple):
-    """Where a law acts, what its curve is multiplied with, and what the curve depends on."""
+    """Where a law acts, what its curve or surface is multiplied with, and what this depends on."""
 
     acts_on: str
     times: str
     signal: str
+    second_signal: str = ""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """As an effect's record says in whose place it acts (`EffectRecord.kinds`)."""
+        return tuple(filter(None, self))
 
     @property
     def site(self) -> str:
@@ -52,6 +65,8 @@ KINDS = (
     *(Kind(SIDEWAYS, "1", signal) for signal in ("w", "heading")),
     *(Kind(WHEELS, "1", signal) for signal in ("own speed", "own push")),
     *(Kind(act, "1", signal) for act in (AHEAD, LEFT, TURN) for signal in ("heading", "x", "y")),
+    *(Kind(act, times, "x", "y") for act, times in FLOOR),
+    *(Kind(act, "1", *pair) for act in (ALONG, HEADING) for pair in (("v", "w"), ("push right", "push left"))),
 )
 """All that are tried. What stands as a product in two of them (v times a curve of w, w times one of v) stands twice."""
 
@@ -67,11 +82,11 @@ class Path(NamedTuple):
 
 
 class Candidate(NamedTuple):
-    """A kind of law, its knots (knots,), and answers of the poses to a unit at each (windows, numbers, knots); density
-    (knots,): rows that lie nearest to each."""
+    """A kind of law, the knots of each of its signals, and answers of the poses to a unit at each knot (windows,
+    numbers, knots); density: rows that lie nearest to each. Knots of a surface stand row by row."""
 
     kind: Kind
-    at: Any
+    at: tuple[Any, ...]
     columns: Any
     density: Any
 
@@ -93,23 +108,41 @@ def path_of(fit: Solution, windows: Windows, laws: Laws | None = None) -> Path:
 
 
 def candidates(path: Path, responses: Responses) -> Iterator[Candidate]:
-    """Every kind of law whose signal varies, about a path."""
+    """Every kind of law whose signals vary, about a path."""
     for kind in KINDS:
-        signal = path.own[kind.signal] if kind.acts_on == WHEELS else path.signals[kind.signal]
-        low, high = np.quantile(signal, INSIDE)
-        if high - low > VARIED:
-            at = np.linspace(low, high, KNOTS)
-            density = np.bincount(np.abs(signal.ravel()[:, None] - at).argmin(axis=1), minlength=KNOTS)
+        signals = _signals(kind, path)
+        ranges = [np.quantile(signal, INSIDE) for signal in signals]
+        if all(high - low > VARIED for low, high in ranges):
+            at = tuple(np.linspace(low, high, SECOND_KNOTS if kind.second_signal else KNOTS) for low, high in ranges)
+            density = _nearest(signals, at)
             yield Candidate(kind, at, columns_of(kind, at, path, responses), density)
 
 
-def columns_of(kind: Kind, at: Array, path: Path, responses: Responses) -> np.ndarray:
-    """Answers of the poses (windows, numbers, knots) to a unit at each knot of a law."""
+def _signals(kind: Kind, path: Path) -> list[np.ndarray]:
+    """What a law depends on, one or two."""
     if kind.acts_on == WHEELS:
-        each = hats(path.own[kind.signal], at)
-        along, heading = (np.einsum("wrsk,s->wrk", each, row) for row in path.gain)
+        return [path.own[kind.signal]]
+    return [path.signals[name] for name in (kind.signal, kind.second_signal) if name]
+
+
+def _nearest(signals: list[np.ndarray], at: tuple[Any, ...]) -> np.ndarray:
+    """Rows that lie nearest to each knot."""
+    place = 0
+    for signal, knots in zip(signals, at, strict=True):
+        place = place * len(knots) + np.abs(signal.ravel()[:, None] - knots).argmin(axis=1)
+    return np.bincount(place, minlength=int(np.prod([len(knots) for knots in at])))
+
+
+def columns_of(kind: Kind, at: tuple[Any, ...], path: Path, responses: Responses) -> np.ndarray:
+    """Answers of the poses (windows, numbers, knots) to a unit at each knot of a law."""
+    signals = _signals(kind, path)
+    shape = hats(signals[0], at[0])
+    if kind.acts_on == WHEELS:
+        along, heading = (np.einsum("wrsk,s->wrk", shape, row) for row in path.gain)
         return responses.along @ along + responses.heading @ heading
-    shape = hats(path.signals[kind.signal], at) * path.signals[kind.times][..., None]
+    for signal, knots in zip(signals[1:], at[1:], strict=True):
+        shape = (shape[..., :, None] * hats(signal, knots)[..., None, :]).reshape(*signal.shape, -1)
+    shape = shape * path.signals[kind.times][..., None]
     if kind.acts_on in BY_CAMERA:
         return _by_camera(kind.acts_on, shape, path)
     answer = {ALONG: responses.along, HEADING: responses.heading, SIDEWAYS: responses.left}[kind.acts_on]

@@ -1,11 +1,13 @@
-"""A curve with a roughness prior, on Gram matrices: its size by restricted likelihood, and what it brings where it was
-not fitted.
+"""A curve or surface with a roughness prior, on Gram matrices: its size by restricted likelihood, and what it brings
+where it was not fitted.
 
 The values at the knots are normal about zero, with the precision (D' D + FLAT I) / s^2, D second differences: a
-penalised spline (Eilers, Marx 1996, Statistical Science 11). s is the one of greatest restricted likelihood, nominal
-parameters, effects and start states being free; no smoothing is set by hand.
+penalised spline (Eilers, Marx 1996, Statistical Science 11). For a surface D' D is the sum of those along both signals
+(Eilers, Marx 2003, Chemometrics and Intelligent Laboratory Systems 66). s is the one of greatest restricted likelihood,
+nominal parameters, effects and start states being free; no smoothing is set by hand.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -31,28 +33,33 @@ class Bent(NamedTuple):
     variance: float
 
 
-def precision(knots: int) -> np.ndarray:
-    """Prior precision (knots, knots) of a curve of unit size."""
-    bend = np.diff(np.eye(knots), 2, axis=0)
-    return bend.T @ bend + FLAT * np.eye(knots)
+def precision(at: Sequence[Array]) -> np.ndarray:
+    """Prior precision (n, n) of a law of unit size with some knots along each of its signals; n: all its knots, row by
+    row."""
+    whole, order = np.zeros((1, 1)), 2 if len(at) == 1 else 1
+    for knots in at:
+        bend = np.diff(np.eye(len(knots)), order, axis=0)
+        whole = np.kron(whole, np.eye(len(knots))) + np.kron(np.eye(len(whole)), bend.T @ bend)
+    return whole + FLAT * np.eye(len(whole))
 
 
-def bend(by_window: Array, prior: Array, knots: int) -> Bent:
-    """The curve of the last `knots` columns before the residual, all other columns free under their prior.
+def bend(by_window: Array, prior: Array, smooth: Array) -> Bent:
+    """The law whose columns stand last before the residual, all other columns free under their prior.
 
-    by_window (windows, n, n): products of columns, the residual last; prior (n, n): what a prior of the others adds.
+    by_window (windows, n, n): products of columns, the residual last; prior (n, n): what a prior of the others adds;
+    smooth (knots, knots): `precision` of the law.
     """
-    summed = by_window.sum(axis=0) + prior
+    summed, knots = by_window.sum(axis=0) + prior, len(smooth)
     free = len(summed) - 1 - knots
     left, right = _freed(summed, free)
-    root = np.linalg.cholesky(np.linalg.inv(precision(knots)))
+    root = np.linalg.cholesky(np.linalg.inv(smooth))
     power, turn = np.linalg.eigh(root.T @ left @ root)
     power, share = np.maximum(power, 0.0), (turn.T @ (root.T @ right)) ** 2
     sizes = SIZES / max(float(np.mean(power)), 1e-300)
     grown = sizes[:, None] * power
     evidence = 0.5 * np.sum(sizes[:, None] * share / (1.0 + grown) - np.log1p(grown), axis=1)
     best = int(np.argmax(evidence))
-    return Bent(float(evidence[best]), _held_out(by_window, prior, knots, sizes[best]), float(sizes[best]))
+    return Bent(float(evidence[best]), _held_out(by_window, prior, smooth / sizes[best]), float(sizes[best]))
 
 
 def _freed(summed: Array, free: int) -> tuple[np.ndarray, np.ndarray]:
@@ -64,11 +71,11 @@ def _freed(summed: Array, free: int) -> tuple[np.ndarray, np.ndarray]:
     return rest[:-1, :-1], rest[:-1, -1]
 
 
-def _held_out(by_window: Array, prior: Array, knots: int, variance: float) -> float:
+def _held_out(by_window: Array, prior: Array, own_prior: Array) -> float:
     """The fall of -log p on windows left out, less that of a fit without the curve."""
-    fold = np.arange(len(by_window)) % FOLDS
+    fold, knots = np.arange(len(by_window)) % FOLDS, len(own_prior)
     smooth = np.zeros_like(prior)
-    smooth[-1 - knots : -1, -1 - knots : -1] = precision(knots) / variance
+    smooth[-1 - knots : -1, -1 - knots : -1] = own_prior
     whole = by_window.sum(axis=0)
     gained = 0.0
     for number in range(FOLDS):

@@ -25,12 +25,12 @@ SHORTER = (1.0, 0.5, 0.2, 0.05)
 
 
 class Curve(NamedTuple):
-    """A discovered law for commands over their largest: knots, values there and their deviations (knots,), the variance
-    of its roughness prior, and how many rows lie nearest to each knot; alike: other kinds of laws that
-    would explain nearly as much."""
+    """A discovered law for commands over their largest: knots along each of its signals, values there and their
+    deviations (knots,), the variance of its roughness prior, and how many rows lie nearest to each knot; alike: other
+    kinds of laws that would explain nearly as much. Knots of a surface stand row by row."""
 
     kind: Kind
-    at: Any
+    at: tuple[Any, ...]
     value: Any
     deviation: Any
     variance: float
@@ -64,7 +64,11 @@ def laws_from(curves: tuple[Curve, ...]) -> Laws | None:
 
 def as_law(curve: Curve, largest: float = 1.0) -> Discovered:
     """A curve as a model holds it, in the user's unit."""
-    return scaled(Discovered(*curve.kind, curve.at, curve.value, curve.deviation), largest)
+    kind, (at, *second), shape = curve.kind, curve.at, [len(knots) for knots in curve.at]
+    value, deviation = (np.reshape(column, shape) for column in (curve.value, curve.deviation))
+    law = Discovered(kind.acts_on, kind.times, kind.signal, at, value, deviation, kind.second_signal,
+                     second[0] if second else None)  # fmt: skip
+    return scaled(law, largest)
 
 
 def curve_columns(fit: Solution, data: Data, curves: tuple[Curve, ...]) -> np.ndarray:
@@ -79,12 +83,12 @@ def curve_columns(fit: Solution, data: Data, curves: tuple[Curve, ...]) -> np.nd
 
 def smoothness(curves: tuple[Curve, ...]) -> np.ndarray:
     """Prior precision (n, n) of the values of all curves, one after the other."""
-    count = sum(len(curve.at) for curve in curves)
+    count = sum(len(curve.value) for curve in curves)
     whole, place = np.zeros((count, count)), 0
     for curve in curves:
-        own = slice(place, place + len(curve.at))
-        whole[own, own] = precision(len(curve.at)) / curve.variance
-        place += len(curve.at)
+        own = slice(place, place + len(curve.value))
+        whole[own, own] = precision(curve.at) / curve.variance
+        place += len(curve.value)
     return whole
 
 
@@ -144,9 +148,14 @@ def _arrived(
     own = len(fit.places)
     covariance = covariance_from(around.summed, fit.places, data.windows)
     spread = np.sqrt(np.maximum(np.diagonal(covariance)[own:], 0.0))
-    pieces = np.split(spread, np.cumsum([len(curve.at) for curve in curves])[:-1])
+    pieces = np.split(spread, _ends(curves)[:-1])
     found = tuple(curve._replace(deviation=part) for curve, part in zip(curves, pieces, strict=True))
     return fit._replace(covariance=covariance[:own, :own]), found, covariance
+
+
+def _ends(curves: tuple[Curve, ...]) -> np.ndarray:
+    """Where the values of each curve end among those of all."""
+    return np.cumsum([len(curve.value) for curve in curves])
 
 
 def _values(curves: tuple[Curve, ...]) -> np.ndarray:
@@ -154,7 +163,7 @@ def _values(curves: tuple[Curve, ...]) -> np.ndarray:
 
 
 def _with_values(curves: tuple[Curve, ...], values: Array) -> tuple[Curve, ...]:
-    pieces = np.split(values, np.cumsum([len(curve.at) for curve in curves])[:-1])
+    pieces = np.split(values, _ends(curves)[:-1])
     return tuple(curve._replace(value=part) for curve, part in zip(curves, pieces, strict=True))
 
 

@@ -1,6 +1,6 @@
-"""What a discovered curve looks like: the simple form that explains most of it, where the robot has been."""
+"""What a discovered curve or surface looks like: the simple form that explains most of it, where the robot has been."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +14,8 @@ LIKE = 0.8
 SIMPLER = 0.01
 """By which a form further down the list has to explain more. No other value was tried."""
 FORCES = (ALONG, HEADING)
+NOMINAL = ("v", "w", "push right", "push left", "own speed", "own push")
+"""Signals on which a force of the nominal robot depends, in a straight line."""
 BENDS = np.linspace(0.1, 0.9, 17)
 """Places of a bend or a step that are tried, as parts of the range of a signal."""
 
@@ -40,10 +42,19 @@ BENT: Forms = {
 }
 """Forms that begin at some s0."""
 ANGLES = ("c sin(s)", "c cos(s)", "c sin(2 s)", "c cos(2 s)")
+PRODUCTS: Forms = {
+    "c s t": lambda s, t: s * t,
+    "c |s| t": lambda s, t: np.abs(s) * t,
+    "c s |t|": lambda s, t: s * np.abs(t),
+    "c |s t|": lambda s, t: np.abs(s * t),
+}
+"""Forms of two signals s and t."""
+PATCH = "c within a circle"
+"""Around a place on the floor: centre and radius [m]."""
 
 
 class Form(NamedTuple):
-    """A form, its numbers, and the part of the curve that it explains over the rows that there are."""
+    """A form, its numbers, and the part of the curve or surface that it explains over the rows that there are."""
 
     form: str
     parameters: dict[str, float]
@@ -53,52 +64,80 @@ class Form(NamedTuple):
 def form_of(law: Discovered, density: Sequence[int]) -> Form | None:
     """The form that explains most of a law, the simplest one where two explain as much; None below LIKE.
 
-    density (knots,): rows that lie nearest to each knot. What the nominal robot has itself (`_own`) is free: a rate
-    may take up the straight line in a drag, and the form is that of the rest.
+    density: rows that lie nearest to each knot, row by row for a surface. What the nominal robot has itself (`_own`) is
+    free: a rate may take up the straight line in a drag, and the form is that of the rest.
     """
-    s, value = np.asarray(law.at), np.asarray(law.value)
-    weight = np.maximum(np.asarray(density, float), 1e-9)
-    tried: list[tuple[str, dict[str, float], np.ndarray]] = []
-    tried += [
-        (name, {}, shape(s, s)) for name, shape in SHAPES.items() if name not in ANGLES or law.signal == "heading"
-    ]
-    tried += [
-        (name, {"s0": float(s0)}, shape(s, s0))
-        for name, shape in BENT.items()
-        for s0 in s[0] + BENDS * np.ptp(s)
-        if "|s|" not in name or s0 > 0.0
-    ]
+    root = np.sqrt(np.maximum(np.asarray(density, float), 1e-9))
+    own = root[:, None] * _own(law)
+    free = own @ np.linalg.pinv(own)
+    value = root * np.ravel(law.value)
     best: Form | None = None
-    for name, more, basis in tried:
-        size, part = _explained(value, basis, _own(law), weight)
+    for name, more, basis in _of_two(law) if law.second_signal else _of_one(law):
+        size, part = _explained(value - free @ value, root * basis, free)
         if best is None or part > best.part_explained + SIMPLER:
             best = Form(name, {"c": size, **more}, part)
     return best if best is not None and best.part_explained >= LIKE else None
 
 
+Tried = Iterator[tuple[str, dict[str, float], np.ndarray]]
+
+
+def _of_one(law: Discovered) -> Tried:
+    """Forms of one signal: name, numbers but for c, and values (knots,) with c = 1."""
+    s = np.asarray(law.at)
+    for name, shape in SHAPES.items():
+        if name not in ANGLES or law.signal == "heading":
+            yield name, {}, shape(s, s)
+    for name, shape in BENT.items():
+        for s0 in s[0] + BENDS * np.ptp(s):
+            if "|s|" not in name or s0 > 0.0:
+                yield name, {"s0": float(s0)}, shape(s, s0)
+
+
+def _of_two(law: Discovered) -> Tried:
+    """Forms of two signals: products, or on the floor a round patch."""
+    s, t = _knots(law)
+    if (law.signal, law.second_signal) != ("x", "y"):
+        for name, shape in PRODUCTS.items():
+            yield name, {}, shape(s, t)
+        return
+    width = min(np.ptp(s), np.ptp(t))
+    for x0 in s.min() + BENDS * np.ptp(s):
+        for y0 in t.min() + BENDS * np.ptp(t):
+            far = np.hypot(s - x0, t - y0)
+            for radius in BENDS * width:
+                # half a knot wide, as a surface between its knots is
+                inside = np.clip((radius - far) / (0.1 * width) + 0.5, 0.0, 1.0)
+                yield PATCH, {"x0": float(x0), "y0": float(y0), "radius": float(radius)}, inside
+
+
+def _knots(law: Discovered) -> tuple[np.ndarray, np.ndarray]:
+    """Both signals (n,) at all knots of a surface, row by row."""
+    s, t = np.meshgrid(law.at, law.second_at, indexing="ij")
+    return s.ravel(), t.ravel()
+
+
 def beyond(law: Discovered, density: Sequence[int]) -> np.ndarray:
     """The values of a law less the part that the nominal robot could have as well, where the robot has been."""
-    value, own, root = np.asarray(law.value), _own(law), np.sqrt(np.maximum(np.asarray(density, float), 1e-9))
-    if not own.shape[1]:
-        return value
-    return value - own @ np.linalg.lstsq(root[:, None] * own, root * value, rcond=None)[0]
+    value, own, root = np.ravel(law.value), _own(law), np.sqrt(np.maximum(np.asarray(density, float), 1e-9))
+    if own.shape[1]:
+        value = value - own @ np.linalg.lstsq(root[:, None] * own, root * value, rcond=None)[0]
+    return value.reshape(np.shape(law.value))
 
 
 def _own(law: Discovered) -> np.ndarray:
     """Columns (knots, n) that the nominal robot has itself: rates, couplings and gains."""
-    s = np.asarray(law.at)
     if law.times != "1" and law.acts_on in FORCES:
-        return np.ones((len(s), 1))
-    linear = law.times == "1" and law.signal in ("v", "w", "push right", "push left", "own speed", "own push")
-    return s[:, None] if linear else np.zeros((len(s), 0))
+        return np.ones((np.size(law.value), 1))
+    signals = _knots(law) if law.second_signal else (np.asarray(law.at),)
+    names = (law.signal, law.second_signal)
+    own = [s for s, name in zip(signals, names, strict=False) if law.times == "1" and name in NOMINAL]
+    return np.stack(own, axis=1) if own else np.zeros((np.size(law.value), 0))
 
 
-def _explained(value: Array, basis: Array, own: Array, weight: Array) -> tuple[float, float]:
-    """The factor of a basis beside what is free, and the part that it explains of the weighted squares beyond that."""
-    root = np.sqrt(weight)
-    columns = root[:, None] * own
-    free = columns @ np.linalg.pinv(columns) if own.shape[1] else np.zeros((len(value),) * 2)
-    left, more = (root * each - free @ (root * each) for each in (value, basis))
-    power, total = float(more @ more), float(left @ left)
-    size = float(more @ left) / power if power > 1e-9 * float(np.sum(weight * basis**2)) else 0.0
-    return size, 1.0 - float(np.sum((left - size * more) ** 2)) / max(total, 1e-300)
+def _explained(value: Array, basis: Array, free: Array) -> tuple[float, float]:
+    """The factor of a basis beside what is free, and the part that it explains of the squares of a value beyond it."""
+    more = basis - free @ basis
+    power, total = float(more @ more), float(value @ value)
+    size = float(more @ value) / power if power > 1e-9 * float(basis @ basis) else 0.0
+    return size, 1.0 - float(np.sum((value - size * more) ** 2)) / max(total, 1e-300)

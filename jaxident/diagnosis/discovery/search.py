@@ -10,8 +10,8 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.causes.finding import Finding
 from jaxident.diagnosis.causes.search_rounds import SURE
 from jaxident.diagnosis.causes.settled import LIKELY, whiten
-from jaxident.diagnosis.discovery.candidates import KINDS, KNOTS, candidates, path_of
-from jaxident.diagnosis.discovery.curves import Bent, bend
+from jaxident.diagnosis.discovery.candidates import KINDS, candidates, path_of
+from jaxident.diagnosis.discovery.curves import Bent, bend, precision
 from jaxident.diagnosis.discovery.fit import (
     Bending,
     Curve,
@@ -73,10 +73,10 @@ def strongest(data: Data, fit: Solution, curves: tuple[Curve, ...]) -> Curve | N
     for each in candidates(path_of(fit, data.windows, laws_from(curves)), responses):
         if any(each.kind == curve.kind for curve in curves):
             continue
-        bent = _beside(data, fit, base, prior, each.columns)
+        bent = _beside(data, fit, base, prior, each.columns, precision(each.at))
         worth = min(bent.evidence - PRICE, bent.held_out)
         if worth > SURE:
-            none = np.zeros(KNOTS)
+            none = np.zeros(each.columns.shape[2])
             found.append((worth, Curve(each.kind, each.at, none, none, bent.variance, each.density)))
     if not found:
         return None
@@ -99,16 +99,16 @@ def _base(data: Data, fit: Solution, curves: tuple[Curve, ...]) -> tuple[np.ndar
     return whitened, prior
 
 
-def _beside(data: Data, fit: Solution, base: Array, prior: Array, columns: Array) -> Bent:
-    """What a curve of some columns brings beside a base."""
+def _beside(data: Data, fit: Solution, base: Array, prior: Array, columns: Array, smooth: Array) -> Bent:
+    """What a curve of some columns and a roughness prior brings beside a base."""
     answers, _ = without_starts(data.whitener, columns, fit.linear.starts)
     whole = np.concatenate([base[..., :-1], answers, base[..., -1:]], axis=2)
-    return bend(whole.transpose(0, 2, 1) @ whole, _spread_out(prior), KNOTS)
+    return bend(whole.transpose(0, 2, 1) @ whole, _spread_out(prior, len(smooth)), smooth)
 
 
-def _spread_out(prior: Array) -> np.ndarray:
-    """A prior's products (n, n), the residual last, with KNOTS columns before the residual that it says nothing of."""
-    places = [*range(len(prior) - 1), len(prior) - 1 + KNOTS]
-    whole = np.zeros((len(prior) + KNOTS,) * 2)
+def _spread_out(prior: Array, knots: int) -> np.ndarray:
+    """A prior's products (n, n), the residual last, with so many columns before it that the prior says nothing of."""
+    places = [*range(len(prior) - 1), len(prior) - 1 + knots]
+    whole = np.zeros((len(prior) + knots,) * 2)
     whole[np.ix_(places, places)] = prior
     return whole

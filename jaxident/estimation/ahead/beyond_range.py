@@ -3,13 +3,13 @@
 import numpy as np
 
 from jaxident.array_types import Array, Wheels
-from jaxident.effects.discovered import SIGNALS
+from jaxident.effects.discovered import SIGNALS, knots_by_signal
 from jaxident.estimation.ahead.stretches import Starts, cut_stretches
 from jaxident.log import Log
 from jaxident.numerics import wrap
 from jaxident.robot.dead_zone import effective_command
 from jaxident.robot.drive import wheel_speeds
-from jaxident.robot.model import Discovered, Model, require_physical
+from jaxident.robot.model import Model, require_physical
 
 FAR = 0.1
 """By which part of its range a signal has to pass a curve's last knot. Knots end where one row in a hundred lies
@@ -23,20 +23,22 @@ def beyond_range(model: Model, log: Log, starts: Starts, pose: Array, session_ti
     found = signals(model, log, starts, pose, session_time)
     lines = []
     for law in model.discovered:
-        count = int(np.sum(np.any(_outside(law, found[law.signal]), axis=0)))
+        ranges = knots_by_signal(law)
+        outside = [np.any(_outside(at, found[signal]), axis=0) for signal, at in ranges.items()]
+        count = int(np.sum(np.any(outside, axis=0)))
         if count:
+            told = " and ".join(f"{at[0]:.3g} to {at[-1]:.3g} {SIGNALS[name]} of {name}" for name, at in ranges.items())
             lines.append(
-                f"{count} of {len(starts.row)} free runs leave the range {law.at[0]:.3g} to {law.at[-1]:.3g} "
-                f"{SIGNALS[law.signal]} of {law.signal} in which the discovered {law.acts_on} was seen: it is held "
-                "constant there"
+                f"{count} of {len(starts.row)} free runs leave the range {told} in which the discovered {law.acts_on} "
+                "was seen: it is held constant there"
             )
     return lines
 
 
-def _outside(law: Discovered, signal: Array) -> np.ndarray:
-    """Where a signal (rows, starts) lies clearly beyond a law's knots; nowhere where it is NaN."""
-    room = FAR * (law.at[-1] - law.at[0])
-    return (signal < law.at[0] - room) | (signal > law.at[-1] + room)
+def _outside(at: Array, signal: Array) -> np.ndarray:
+    """Where a signal (rows, starts) lies clearly beyond some knots; nowhere where it is NaN."""
+    room = FAR * (at[-1] - at[0])
+    return (signal < at[0] - room) | (signal > at[-1] + room)
 
 
 def signals(model: Model, log: Log, starts: Starts, pose: Array, session_time: float) -> dict[str, np.ndarray]:

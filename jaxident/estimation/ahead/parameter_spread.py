@@ -71,7 +71,9 @@ def parameter_values(model: Model) -> dict[str, float]:
         "coupling_1": coupling[0], "coupling_2": coupling[1],
     }  # fmt: skip
     effects = {f"{e.name}.{key}": value for e in model.effects for key, value in e.parameters.items()}
-    laws = {value_name(k, n): value for k, law in enumerate(model.discovered) for n, value in enumerate(law.value)}
+    laws = {
+        value_name(k, n): value for k, law in enumerate(model.discovered) for n, value in enumerate(np.ravel(law.value))
+    }
     return {name: float(value) for name, value in (dict(rows) | effects | laws).items()}
 
 
@@ -88,7 +90,9 @@ def with_values(model: Model, changed: Mapping[str, float]) -> Model:
         for e in model.effects
     )  # fmt: skip
     laws = tuple(
-        dataclasses.replace(law, value=np.array([value[value_name(k, n)] for n in range(len(law.at))]))
+        dataclasses.replace(
+            law, value=np.reshape([value[value_name(k, n)] for n in range(np.size(law.value))], np.shape(law.value))
+        )
         for k, law in enumerate(model.discovered)
     )
     dead_zone = np.array([value["dead_zone_r"], value["dead_zone_l"]])

@@ -8,11 +8,12 @@ import pytest
 
 import jaxident as ji
 from jaxident.diagnosis.causes.finding import find_effects
-from jaxident.diagnosis.discovery.candidates import KINDS, Kind, hats
-from jaxident.diagnosis.discovery.curves import bend, solved
+from jaxident.diagnosis.discovery.candidates import KINDS, SECOND_KNOTS, Kind, Path, columns_of, hats
+from jaxident.diagnosis.discovery.curves import bend, precision, solved
 from jaxident.diagnosis.discovery.fit import Curve, as_law
 from jaxident.diagnosis.discovery.forms import beyond, form_of
 from jaxident.diagnosis.discovery.search import discover
+from jaxident.diagnosis.motion.responses import Responses
 from jaxident.diagnosis.preparation.prepare import prepare
 from jaxident.effects.coordinates import PLACES
 from jaxident.log import join, make_log
@@ -22,6 +23,8 @@ from jaxident.robot.noise import Noise
 
 KNOTS = 10
 AT = np.linspace(-1.0, 1.0, KNOTS)
+FLOOR = np.linspace(-0.7, 0.7, SECOND_KNOTS)
+S, T = np.meshgrid(FLOOR, FLOOR, indexing="ij")
 
 
 def test_hats_add_up_to_one_and_draw_the_curve():
@@ -41,7 +44,7 @@ def windows_of(curve, rng, windows=40, rows=30):
 
 def test_a_curve_in_the_data_is_found_and_its_values_are_near():
     by_window = windows_of(lambda s: 0.5 * np.sin(3.0 * s), np.random.default_rng(1))
-    found = bend(by_window, np.zeros(by_window.shape[1:]), KNOTS)
+    found = bend(by_window, np.zeros(by_window.shape[1:]), precision((AT,)))
     assert found.evidence > 20.0
     assert found.held_out > 20.0
     values = solved(by_window.sum(axis=0), 1 + KNOTS)
@@ -52,7 +55,7 @@ def test_a_curve_in_the_data_is_found_and_its_values_are_near():
 def test_noise_alone_brings_no_curve():
     """Of 200 signals without any part in the data one in fifty may seem to be worth 2, none the 9 that are asked."""
     found = [
-        bend(by_window, np.zeros(by_window.shape[1:]), KNOTS)
+        bend(by_window, np.zeros(by_window.shape[1:]), precision((AT,)))
         for by_window in (windows_of(np.zeros_like, np.random.default_rng(k), 12) for k in range(200))
     ]
     worth = np.array([min(one.evidence, one.held_out) for one in found])
@@ -61,7 +64,13 @@ def test_noise_alone_brings_no_curve():
 
 
 def curve_of(kind: Kind, value) -> Curve:
-    return Curve(kind, AT, value, np.full(KNOTS, 0.01), 1.0, np.ones(KNOTS))
+    return Curve(kind, (AT,), value, np.full(KNOTS, 0.01), 1.0, np.ones(KNOTS))
+
+
+def surface_of(kind: Kind, value) -> Curve:
+    """A surface on an even floor."""
+    value = np.ravel(value)
+    return Curve(kind, (FLOOR, FLOOR), value, np.full(value.size, 0.01), 1.0, np.ones(value.size))
 
 
 @pytest.mark.parametrize(
@@ -91,6 +100,49 @@ def test_what_the_nominal_robot_has_as_well_is_taken_away():
     np.testing.assert_array_equal(beyond(camera, np.ones(KNOTS)), 0.02 * AT)
 
 
+@pytest.mark.parametrize(
+    ("kind", "value", "form"),
+    [
+        (Kind("acceleration along", "v", "x", "y"), -2.0 * (np.hypot(S - 0.1, T + 0.1) < 0.35), "c within a circle"),
+        (Kind("acceleration in heading", "1", "v", "w"), 0.4 * S - T - 3.0 * S * T, "c s t"),  # straight ones are rates
+        (Kind("acceleration along", "1", "v", "w"), -3.0 * S * np.abs(T), "c s |t|"),
+    ],
+)
+def test_simple_forms_of_surfaces_are_recognised(kind, value, form):
+    surface = surface_of(kind, value)
+    found = form_of(as_law(surface), surface.density)
+    assert found is not None
+    assert found.form == form
+    assert found.part_explained > (0.8 if "circle" in form else 0.999)
+    if "circle" in form:
+        assert np.hypot(found.parameters["x0"] - 0.1, found.parameters["y0"] + 0.1) < 0.15
+        assert abs(found.parameters["radius"] - 0.35) < 0.15
+
+
+def test_a_surface_answers_as_its_knots_say():
+    """Columns of a surface times its values are the answer to the surface itself, between the knots and beyond."""
+    rng = np.random.default_rng(4)
+    x, y, v = rng.uniform(-1.0, 1.0, (3, 2, 30))
+    answer = rng.normal(size=(2, 90, 30))
+    path = Path({"x": x, "y": y, "v": v}, {}, np.eye(2), np.ones((2, 90)))
+    columns = columns_of(Kind("acceleration along", "v", "x", "y"), (FLOOR, FLOOR), path, Responses(answer, None, None))
+    value = rng.normal(size=(SECOND_KNOTS, SECOND_KNOTS))
+    rows = np.array([np.interp(np.ravel(y), FLOOR, row) for row in value])
+    there = [np.interp(s, FLOOR, column) for s, column in zip(np.ravel(x), rows.T, strict=True)]
+    np.testing.assert_allclose(
+        columns @ np.ravel(value), np.einsum("wnr,wr->wn", answer, v * np.reshape(there, x.shape))
+    )
+
+
+def test_a_surface_that_is_flat_costs_next_to_nothing():
+    """A prior on first differences along both signals: what is not known of a place is what its neighbours are."""
+    whole = precision((FLOOR, FLOOR))
+    flat, tilted = np.ones(S.size), np.ravel(S - S.min()) / np.ptp(S)
+    assert flat @ whole @ flat < 0.1
+    assert tilted @ whole @ tilted > flat @ whole @ flat
+    np.testing.assert_allclose(whole, whole.T)
+
+
 def test_a_wild_curve_looks_like_nothing():
     curve = curve_of(Kind("pose ahead", "1", "x"), np.cos(np.pi * np.arange(KNOTS)))
     assert form_of(as_law(curve), curve.density) is None
@@ -100,7 +152,7 @@ def test_every_kind_can_be_run():
     from jaxident.effects.discovered import check_discovered
 
     for kind in KINDS:
-        check_discovered([Discovered(*kind, AT, AT)])
+        check_discovered([as_law(surface_of(kind, S) if kind.second_signal else curve_of(kind, AT))])
         assert kind.site in ("actuation", "drive", "contact", "time", "camera")
 
 
@@ -133,11 +185,12 @@ def test_a_speed_that_falls_with_the_square_of_the_turn_rate_is_discovered():
     found = searched(dataclasses.replace(ROBOT, discovered=(law,)), 1)
     assert found
     first = found[0].curves[0]
+    (at,) = first.at
     assert first.kind == Kind("acceleration along", "v", "w")
     assert first.alike == ()
-    here = first.value - np.interp(0.0, first.at, first.value)  # the rate may take a constant
+    here = first.value - np.interp(0.0, at, first.value)  # the rate may take a constant
     loss = found[0].fit.vector[PLACES["turn_loss", "loss"]]
-    apart = np.abs(here - loss * np.abs(first.at) + 0.25 * first.at**2)
+    apart = np.abs(here - loss * np.abs(at) + 0.25 * at**2)
     assert np.all(apart < 4.0 * first.deviation)
     assert apart.mean() < 0.2
 
@@ -150,6 +203,21 @@ def test_laws_that_explain_as_much_are_named():
     first = searched(dataclasses.replace(ROBOT, discovered=(law,)), 3)[0].curves[0]
     both = {Kind("acceleration along", "w", "v"), Kind("acceleration along", "v", "w")}
     assert both <= {first.kind, *first.alike}
+
+
+@pytest.mark.slow
+def test_a_round_carpet_is_found_as_a_surface():
+    """No curve of x or of y makes it."""
+    floor = np.linspace(-1.5, 1.5, 8)
+    x, y = np.meshgrid(floor, floor, indexing="ij")
+    law = Discovered("acceleration along", "v", "x", floor, -4.0 * (np.hypot(x, y) < 0.7), None, "y", floor)
+    first = searched(dataclasses.replace(ROBOT, discovered=(law,)), 5)[0].curves[0]
+    assert first.kind == Kind("acceleration along", "v", "x", "y")
+    places = np.meshgrid(*first.at, indexing="ij")
+    known = first.density > 40
+    inside = (np.hypot(*places) < 0.5).ravel() & known
+    outside = (np.hypot(*places) > 0.9).ravel() & known
+    assert abs(np.mean(first.value[outside]) - np.mean(first.value[inside]) - 4.0) < 1.0
 
 
 @pytest.mark.slow

@@ -1,0 +1,262 @@
+"""Robots whose effect stands in no catalogue: what does a diagnosis discover, and what does that bring on fresh runs?
+
+    python -m experiments.unlisted --kinds patch castor --seeds 3 --out FOUND
+
+A small simulator of its own drives each robot from one random place in a room to the next: six runs to diagnose, four
+fresh ones to predict 1 s ahead. Each kind below adds accelerations, or changes what drives the wheels. `achieved` is
+what the corrected model takes away of the nominal model's squared error on the fresh runs, beyond what a model that
+knows the effect leaves (the camera's noise and slip). `experiments/discovered.md` tells what came out.
+"""
+
+import argparse
+import json
+import multiprocessing
+import pathlib
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+STEP, ROWS, RUNS, FRESH, SUBSTEPS = 0.05, 1000, 6, 4, 8
+ROOM = 0.8
+"""Half the side of the room [m]."""
+NOISE = (4e-4, 3e-3)
+"""Camera noise [m, rad]."""
+SLIP = (0.003, 0.015)
+"""Density of random accelerations along [m/s^1.5] and in heading [rad/s^1.5]."""
+
+
+class Now(NamedTuple):
+    """State and input of all runs (runs,): pose, speeds, net pushes of both wheels, travelled angle of both [rad], heat
+    of both motors, time since v last changed its sign [s], session time [s]."""
+
+    x: np.ndarray
+    y: np.ndarray
+    theta: np.ndarray
+    v: np.ndarray
+    w: np.ndarray
+    push: np.ndarray
+    angle: np.ndarray
+    heat: np.ndarray
+    reversed: np.ndarray
+    time: np.ndarray
+
+
+Added = tuple[np.ndarray | float, np.ndarray | float]
+
+
+def _patch(now: Now, size: float, rng) -> Added:
+    """A round carpet slows both motions."""
+    inside = 1.0 / (1.0 + np.exp(np.clip((np.hypot(now.x - 0.2, now.y + 0.1) - 0.35) / 0.01, -50, 50)))
+    return -3.0 * size * inside * now.v, -3.0 * size * inside * now.w
+
+
+def _swirl(now: Now, size: float, rng) -> Added:
+    """The nap of a carpet turns the robot: more the farther it is from the middle of the room, by its direction."""
+    return 0.0, 4.0 * size * now.v * (now.x * np.cos(now.theta) + now.y * np.sin(now.theta))
+
+
+def _tilt(now: Now, size: float, rng) -> Added:
+    """A floor like a saddle."""
+    return 0.5 * size * (now.x * np.cos(now.theta) - now.y * np.sin(now.theta)), 0.0
+
+
+def _turning(now: Now, size: float, rng) -> Added:
+    """Speed is lost with the square of the turn rate."""
+    return -0.4 * size * now.w**2 * now.v, 0.0
+
+
+def _friction(now: Now, size: float, rng) -> Added:
+    """A rubbing seal: a drag that hardly grows with speed."""
+    return -0.25 * size * np.sign(now.v) * np.abs(now.v / 0.1) ** 0.4, -1.0 * size * np.sign(now.w) * np.abs(now.w) ** 0.4
+
+
+def _coupled(now: Now, size: float, rng) -> Added:
+    """Each motion is slowed by the other one's size."""
+    return -1.5 * size * np.abs(now.w) * now.v, -6.0 * size * np.abs(now.v) * now.w
+
+
+def _castor(now: Now, size: float, rng) -> Added:
+    """A castor that swings round after a reversal holds the robot back for a while."""
+    swing = np.exp(-now.reversed / 0.4)
+    return -5.0 * size * swing * now.v, 2.0 * size * swing * np.sign(now.v)
+
+
+def _bumps(now: Now, size: float, rng) -> Added:
+    """Blows at random: not to be predicted."""
+    hit = rng.random(now.v.shape) < 0.4 * STEP / SUBSTEPS
+    return 0.0 * now.v, np.where(hit, rng.normal(size=now.v.shape) * 1.0 * size / (STEP / SUBSTEPS), 0.0)
+
+
+def _none(now: Now, size: float, rng) -> Added:
+    return 0.0, 0.0
+
+
+def _hot(push: np.ndarray, now: Now, size: float) -> np.ndarray:
+    """Motors that get hot push less."""
+    return push / (1.0 + 2.0 * size * now.heat)
+
+
+def _cogs(push: np.ndarray, now: Now, size: float) -> np.ndarray:
+    """Magnets of the motor pull the wheel from tooth to tooth, seven to a turn."""
+    return push + 0.3 * size * np.sin(7.0 * now.angle)
+
+
+def _oval(push: np.ndarray, now: Now, size: float) -> np.ndarray:
+    """A wheel that is not round, as a drive sees it: its gain goes with the wheel's angle."""
+    return push * np.stack([1.0 + 0.4 * size * np.sin(now.angle[0]), np.ones_like(now.v)])
+
+
+def _same(push: np.ndarray, now: Now, size: float) -> np.ndarray:
+    return push
+
+
+FORCES: dict[str, Callable[[Now, float, np.random.Generator], Added]] = {
+    "patch": _patch, "swirl": _swirl, "saddle": _tilt, "turning": _turning, "friction": _friction, "coupled": _coupled,
+    "castor": _castor, "bumps": _bumps,
+}  # fmt: skip
+INPUTS: dict[str, Callable[[np.ndarray, Now, float], np.ndarray]] = {"hot": _hot, "cogs": _cogs, "oval": _oval}
+KINDS = (*FORCES, *INPUTS)
+
+
+class Robot(NamedTuple):
+    """Rates [1/s], gains (2, 2), dead zones (2,), wheel radius [m], delay of the commands in rows."""
+
+    rate: np.ndarray
+    gain: np.ndarray
+    zone: np.ndarray
+    radius: float
+    track: float
+
+
+def draw_robot(rng) -> Robot:
+    rate = rng.uniform(2.0, 6.0, 2)
+    top = rng.uniform(0.35, 0.6), rng.uniform(2.0, 4.0)
+    even = 1.0 + rng.uniform(-0.05, 0.05, 2)
+    gain = np.array([0.5 * top[0] * rate[0] * even, 0.5 * top[1] * rate[1] * even * (1.0, -1.0)])
+    return Robot(rate, gain, rng.uniform(0.03, 0.1, 2), 0.03, 0.15)
+
+
+def steer(now: Now, goal: np.ndarray, robot: Robot, rng) -> np.ndarray:
+    """Commands (2, runs) that lead somewhat towards a goal (2, runs), of eight drawn at random."""
+    tried = rng.uniform(-1.0, 1.0, (8, 2, len(now.x)))
+    reached = np.einsum("ij,kjr->kir", robot.gain / robot.rate[:, None], tried)
+    angle = now.theta + 0.5 * reached[:, 1]
+    far = np.hypot(now.x + reached[:, 0] * np.cos(angle) - goal[0], now.y + reached[:, 0] * np.sin(angle) - goal[1])
+    return tried[far.argmin(axis=0), :, np.arange(len(now.x))].T
+
+
+def drive(robot: Robot, kind: str, size: float, runs: int, seed: int, first: float = 0.0) -> np.ndarray:
+    """Logs (runs, ROWS, 6) with noise: t, both commands, pose."""
+    rng = np.random.default_rng(seed)
+    force, change = FORCES.get(kind, _none), INPUTS.get(kind, _same)
+    pose, still = rng.uniform(-1.0, 1.0, (3, runs)) * np.array([[ROOM], [ROOM], [np.pi]]), np.zeros(runs)
+    now = Now(*pose, still, still, np.zeros((2, runs)), rng.uniform(0, 6, (2, runs)), np.zeros((2, runs)), still + 9.0,
+              first + STEP * ROWS * np.arange(runs))  # fmt: skip
+    goal, command, left = rng.uniform(-ROOM, ROOM, (2, runs)), np.zeros((2, runs)), np.zeros(runs)
+    h, rows = STEP / SUBSTEPS, []
+    for row in range(ROWS):
+        near, fresh = np.hypot(now.x - goal[0], now.y - goal[1]) < 0.3, left <= 0
+        goal = np.where(near, rng.uniform(-ROOM, ROOM, (2, runs)), goal)
+        command = np.where(fresh, steer(now, goal, robot, rng), command)
+        left = np.where(fresh, rng.integers(6, 25, runs), left) - 1
+        rows.append([np.full(runs, row * STEP), *command, now.x, now.y, now.theta])
+        jolt = rng.normal(size=(2, runs)) * np.array(SLIP)[:, None] / np.sqrt(STEP)
+        for _ in range(SUBSTEPS):
+            now = _step(robot, now, command, jolt, (force, change, size), h, rng)
+    logs = np.array(rows).transpose(2, 0, 1)
+    seen = rng.normal(size=(runs, ROWS, 3)) * np.array([NOISE[0], NOISE[0], NOISE[1]])
+    logs[..., 3:] += seen
+    logs[..., 5] = (logs[..., 5] + np.pi) % (2.0 * np.pi) - np.pi
+    return logs
+
+
+def _step(robot: Robot, now: Now, command: np.ndarray, jolt: np.ndarray, effect, h: float, rng) -> Now:
+    """One midpoint step of h [s]."""
+    force, change, size = effect
+    m = np.sign(command) * np.maximum(np.abs(command) - robot.zone[:, None], 0.0)
+    m = change(m, now, size)
+    pull = robot.gain @ m
+
+    def rates(v, w, there):
+        along, heading = force(there, size, rng)
+        return pull[0] - robot.rate[0] * v + along + jolt[0], pull[1] - robot.rate[1] * w + heading + jolt[1]
+
+    dv, dw = rates(now.v, now.w, now)
+    middle = now._replace(v=now.v + 0.5 * h * dv, w=now.w + 0.5 * h * dw, theta=now.theta + 0.5 * h * now.w,
+                          x=now.x + 0.5 * h * now.v * np.cos(now.theta), y=now.y + 0.5 * h * now.v * np.sin(now.theta))  # fmt: skip
+    dv, dw = rates(middle.v, middle.w, middle)
+    v, w = now.v + h * dv, now.w + h * dw
+    rolled = np.stack([middle.v + 0.5 * robot.track * middle.w, middle.v - 0.5 * robot.track * middle.w]) / robot.radius
+    return Now(
+        now.x + h * middle.v * np.cos(middle.theta), now.y + h * middle.v * np.sin(middle.theta), now.theta + h * middle.w,
+        v, w, m, now.angle + h * rolled, now.heat + h / 6.0 * (m**2 - now.heat),
+        np.where(v * now.v < 0.0, 0.0, now.reversed + h), now.time + h,
+    )  # fmt: skip
+
+
+def ahead(model, logs, session: float) -> np.ndarray:
+    """Squared errors (starts, 3) 1 s ahead over the camera's variances, on free runs of logs."""
+    import jaxident as ji
+    from jaxident.numerics import wrap
+
+    found = []
+    for log in logs:
+        run = ji.predict(model, log, 20, burn_in=20)
+        last = np.flatnonzero(run.step == 20)
+        row = run.start[last] + 20
+        apart = np.stack([np.asarray(getattr(run, name))[last] - np.asarray(getattr(log, name))[row]
+                          for name in ("x", "y", "theta")], axis=1)  # fmt: skip
+        apart[:, 2] = np.asarray(wrap(apart[:, 2]))
+        found.append((apart / np.array([NOISE[0], NOISE[0], NOISE[1]])) ** 2)
+    return np.concatenate(found)
+
+
+def one(job: tuple[str, int, float]) -> dict:
+    """What a diagnosis of one robot finds, and what that brings on fresh runs."""
+    import jaxident as ji
+
+    kind, seed, size = job
+    ji.start_jax()
+    from jaxident.log import make_log
+
+    def as_log(rows):
+        return make_log(rows[:, 0], rows[:, 1], rows[:, 2], *rows[:, 3:].T)
+
+    robot = draw_robot(np.random.default_rng([seed, 1]))
+    begin = time.perf_counter()
+    found = ji.diagnose([as_log(rows) for rows in drive(robot, kind, size, RUNS, 1000 * seed + 2)])
+    seconds = time.perf_counter() - begin
+    fresh = [as_log(rows) for rows in drive(robot, kind, size, FRESH, 1000 * seed + 3, STEP * ROWS * RUNS)]
+    errors = {name: float(np.mean(ahead(model, fresh, 0.0))) for name, model in (
+        ("nominal", found.nominal_model), ("corrected", found.corrected_model))}  # fmt: skip
+    return {
+        "kind": kind, "seed": seed, "size": size, "seconds": round(seconds, 1), "verdict": found.verdict,
+        "named": list(found.selected),
+        "laws": [{"kind": list(shown.kind), "share": shown.share, "alike": [list(kind) for kind in shown.alike],
+                  "looks like": None if shown.form is None else shown.form._asdict()} for shown in found.discovered],
+        "errors": errors, "promised": [found.gap.before, found.gap.discovered, found.gap.floor],
+    }  # fmt: skip
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--kinds", nargs="+", default=list(KINDS), choices=[*KINDS, "nothing"])
+    parser.add_argument("--seeds", type=int, default=2)
+    parser.add_argument("--first", type=int, default=1)
+    parser.add_argument("--size", type=float, default=1.0)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--out", required=True, type=pathlib.Path)
+    options = parser.parse_args()
+    jobs = [(kind, seed, options.size) for seed in range(options.first, options.first + options.seeds) for kind in options.kinds]
+    rows = []
+    with multiprocessing.get_context("spawn").Pool(options.jobs) as pool:
+        for row in pool.imap_unordered(one, jobs):
+            rows.append(row)
+            print(json.dumps(row), flush=True)
+            options.out.write_text(json.dumps(rows, indent=1))
+
+
+if __name__ == "__main__":
+    main()
