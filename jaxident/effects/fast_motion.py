@@ -30,13 +30,15 @@ class Lag(NamedTuple):
 
 class Row(NamedTuple):
     """What acts during one row of the log: mean and slope of the pushes (substeps, 2, ...), the length of a substep
-    [s], the drive's `Lag` of each speed over it, and the session time [s] at its start."""
+    [s], the drive's `Lag` of each speed over it, the session time [s] at its start, and what the commands left behind
+    (`Past`), None without discovered laws."""
 
     mean: Any
     slope: Any
     part: Any
     lags: Any
     begin: Any
+    past: Any = None
 
 
 def drive_of(vector: Array) -> Physical:
@@ -70,7 +72,7 @@ def advance_row(settings, drive: Physical, state: State, excess: list[Array], ro
         loads = [effect.law(middle, row.part, **values) for effect, values in acting("load", settings)]
         lightness = functools.reduce(operator.mul, loads)
         push = _force(drive, row.mean[number]), _force(drive, row.slope[number])
-        here = Here(state.x, state.y, middle, Wheels(*row.mean[number]))
+        here = Here(state.x, state.y, middle, Wheels(*row.mean[number]), row.past)
         state, excess = _substep(settings, drive, state, excess, push, slip, row.part, row.lags, lightness, here)
     return state, excess
 

@@ -8,9 +8,11 @@ import jax.numpy as jnp
 
 from jaxident.array_types import Array, Pose, State, Wheels
 from jaxident.effects.catalogue import CATALOGUE, by_name
-from jaxident.effects.discovered import DISCOVERED, Laws, shifted, with_laws
+from jaxident.effects.discovered import Here, Laws, shifted, with_laws
 from jaxident.effects.input_chain import at_rest, push
 from jaxident.effects.intervals import Grid, make_grid
+from jaxident.effects.law_kinds import DISCOVERED
+from jaxident.effects.past import Past, past_of
 from jaxident.effects.signals import Motion
 from jaxident.effects.stages import CORNERED, MOVING, acting, holds, seen
 from jaxident.effects.substep import after_half, move, solve_half
@@ -107,7 +109,10 @@ def run_states(
     if key is not None and noise is not None:
         drawn = slip(noise, draw_noise(key, len(t)), jnp.append(jnp.diff(t), 1.0))
         push_aside = Force(*(f[grid.row] for f in drawn))
-    found = _scan(settings, drive, dead_zone, grid, push_aside, start, session_time - t[0])
+    past = None
+    if laws is not None:
+        past = jax.tree.map(lambda leaf: leaf[grid.row], past_of(jnp.asarray(t), jnp.stack(command, axis=-1)))
+    found = _scan(settings, drive, dead_zone, grid, push_aside, past, start, session_time - t[0])
     return jax.tree.map(lambda column: column[grid.at_row], found)
 
 
@@ -160,7 +165,7 @@ def _moves(settings: Settings) -> bool:
     return bool(settings.keys() & MOVING) or DISCOVERED in settings
 
 
-def _scan(settings, drive, dead_zone, grid: Grid, slips: Force | None, start: State, offset: Array):
+def _scan(settings, drive, dead_zone, grid: Grid, slips: Force | None, past: Past | None, start: State, offset: Array):
     """True states (points,) at the points of the grid, and by how much each wheel then turns faster than the ground;
     `offset` takes times of the log to session times."""
     moving = _moves(settings)
@@ -170,7 +175,7 @@ def _scan(settings, drive, dead_zone, grid: Grid, slips: Force | None, start: St
 
     def interval(carry, now):
         state, memory, excess = carry
-        begin, h, target, shove, changed, solution = now
+        begin, h, target, shove, changed, solution, behind = now
 
         def speeds(pushed: Wheels) -> Wheels:
             midway = after_half(solution, Motion(state.v, state.w, state.theta), force(drive, pushed))
@@ -178,7 +183,8 @@ def _scan(settings, drive, dead_zone, grid: Grid, slips: Force | None, start: St
 
         pushed, memory = push(settings, dead_zone, memory, target, begin, h, speeds)
         if moving:
-            after, excess = move(settings, drive, state, excess, pushed, shove, changed, solution, h, begin)
+            here = Here(state.x, state.y, begin + 0.5 * h, pushed.mean, behind)
+            after, excess = move(settings, drive, state, excess, pushed, shove, changed, solution, h, here)
         else:
             pull = force(drive, pushed.mean)
             if shove is not None:
@@ -191,7 +197,7 @@ def _scan(settings, drive, dead_zone, grid: Grid, slips: Force | None, start: St
 
     like = jnp.zeros_like(grid.start, shape=())
     begin = State(*(jnp.asarray(s, like.dtype) for s in start))
-    inputs = (grid.start + offset, length, grid.command, slips, grid.changed, solved)
+    inputs = (grid.start + offset, length, grid.command, slips, grid.changed, solved, past)
     rolling = tuple(Wheels(like, like) for _ in acting("grip", settings))
     (last, _, excess), found = jax.lax.scan(interval, (begin, at_rest(settings, like), rolling), inputs)
     return jax.tree.map(jnp.append, found, (last, together(excess)))

@@ -8,8 +8,9 @@ import numpy as np
 from jaxident.array_types import AT_REST, Array, Pose, State, Wheels
 from jaxident.effects.catalogue import CATALOGUE, to_vector
 from jaxident.effects.checks import check_delay, check_effects
-from jaxident.effects.discovered import check_discovered, laws_of
+from jaxident.effects.discovered import laws_of
 from jaxident.effects.full import run_full, run_states, substeps_for
+from jaxident.effects.law_kinds import check_discovered
 from jaxident.log import Log
 from jaxident.robot import simulate as nominal
 from jaxident.robot.drive import rim_motion

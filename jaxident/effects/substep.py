@@ -14,8 +14,9 @@ import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array, State, Wheels
-from jaxident.effects.discovered import DISCOVERED, Here, pushed, sideways
+from jaxident.effects.discovered import Here, pushed, sideways
 from jaxident.effects.friction import dry_friction
+from jaxident.effects.law_kinds import DISCOVERED
 from jaxident.effects.signals import Motion, Push
 from jaxident.effects.stages import acting, friction_level, holds
 from jaxident.numerics import sin_cos
@@ -37,12 +38,13 @@ def solve_half(drive: Physical, step: Array) -> Half:
 
 
 def move(
-    settings, drive: Physical, state: State, excess: tuple, push: Push, slip: Force | None, changed, half: Half, h, time
+    settings, drive: Physical, state: State, excess: tuple, push: Push, slip: Force | None, changed, half: Half, h, here
 ) -> tuple[State, tuple]:
     """The state one substep of h [s] later, under a push, a random slip (acceleration) and before or after what loads
-    have `changed`, and by how much each wheel then turns faster than the ground; `excess`: by how much it did. time:
-    session time [s] at the start. Friction, held over the substep, moves what the departure depends on, and the other
-    way round: it is settled with a first guess of the departure, and again with the departure that follows.
+    have `changed`, and by how much each wheel then turns faster than the ground; `excess`: by how much it did; here:
+    what discovered laws depend on beside the motion. Friction, held over the substep, moves what the departure depends
+    on, and the other way round: it is settled with a first guess of the departure, and again with the departure that
+    follows.
     """
     pull = force(drive, push.mean)
     if slip is not None:
@@ -51,7 +53,6 @@ def move(
     lightness = _lightness(settings, changed)
     rubs = holds(settings, "friction")
     departs = holds(settings, "load", "grip", "body") or DISCOVERED in settings
-    here = Here(state.x, state.y, time + 0.5 * h, push.mean)
     start = Motion(state.v, state.w, state.theta)
     sliding: tuple = ()
 

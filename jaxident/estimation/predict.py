@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.effects.checks import check_effects
-from jaxident.effects.discovered import check_discovered
+from jaxident.effects.law_kinds import check_discovered
 from jaxident.errors import InputError
 from jaxident.estimation.ahead import session
 from jaxident.estimation.ahead.beyond_range import beyond_range

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.checks import check_effects
-from jaxident.effects.discovered import check_discovered
+from jaxident.effects.law_kinds import check_discovered
 from jaxident.errors import InputError
 from jaxident.export import c_header, gap, gazebo, isaac, mjcf, python, robot_localization, ros2_control, table
 from jaxident.export.ask import Ask, assumed, check, largest_command, reach, unused

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from jaxident.effects.catalogue import CATALOGUE
-from jaxident.effects.discovered import ACTS, SIGNALS, knots_by_signal
 from jaxident.effects.effect import UNIT
+from jaxident.effects.law_kinds import SIGNALS, knots_by_signal, value_unit
 from jaxident.export.split import ANY, CAMERA, COUPLING, DEAD_ZONE, EVERY, GAIN, RATE, SLIP, Target
 from jaxident.export.text import number, origin
 from jaxident.robot.model import Discovered, Model
@@ -104,14 +104,13 @@ def _effect_rows(effect: Any, model: Model) -> list[Row]:
 def _law_rows(law: Discovered, model: Model) -> list[Row]:
     """One row for each knot of a discovered law."""
     factor = "" if law.times == "1" else f"{law.times} times a law of "
-    unit = ACTS[law.acts_on] + {"1": "", "v": " per m/s", "w": " per rad/s"}[law.times]
     spread = np.full(np.shape(law.value), np.nan) if law.standard_deviation is None else law.standard_deviation
     places = [
         [f"{signal} at {float(at):.4g} {SIGNALS[signal]}" for at in knots]
         for signal, knots in knots_by_signal(law).items()
     ]
     return [
-        _row(f"discovered: {law.acts_on}", f"{factor}{', '.join(at)}", value, unit, _or_nan(own),
+        _row(f"discovered: {law.acts_on}", f"{factor}{', '.join(at)}", value, value_unit(law), _or_nan(own),
              law.standard_deviation is not None, model)
         for at, value, own in zip(itertools.product(*places), np.ravel(law.value), np.ravel(spread), strict=True)
     ]  # fmt: skip

@@ -13,7 +13,7 @@ from jaxident.diagnosis.account.where import OF_COMMANDS, Region
 from jaxident.diagnosis.detectability import Replay
 from jaxident.diagnosis.diagnose import Diagnosis
 from jaxident.effects.catalogue import BY_KIND, CATALOGUE
-from jaxident.effects.discovered import knots_by_signal
+from jaxident.effects.law_kinds import HEATS, knots_by_signal
 
 SCHEMA = "jaxident.diagnosis/2"
 
@@ -80,7 +80,7 @@ def _law(shown: Shown) -> dict[str, Any]:
         "acts_on": law.acts_on,
         "times": law.times,
         "inputs": [*knots_by_signal(law), *([] if law.times == "1" else [law.times])],
-        "memory": None,
+        "memory": HEATS.get(law.signal),
         "curve": [dict(zip(keys, point, strict=True)) for point in points],
         "rows": list(shown.density),
         "share": shown.share,

@@ -10,7 +10,7 @@ import numpy as np
 
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.checks import check_parameters
-from jaxident.effects.discovered import check_discovered
+from jaxident.effects.law_kinds import check_discovered
 from jaxident.errors import InputError
 from jaxident.files.schema import Shape, take_array, take_keys, take_list, take_number, take_object, take_text
 from jaxident.robot.drive import Physical

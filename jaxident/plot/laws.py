@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from jaxident.array_types import Array
-from jaxident.effects.discovered import SIGNALS
+from jaxident.effects.law_kinds import SIGNALS
 from jaxident.plot import style
 from jaxident.robot.model import Discovered
 

@@ -8,16 +8,17 @@ from jaxident.diagnosis.diagnose import Diagnosis
 from jaxident.diagnosis.discovery.candidates import Kind
 from jaxident.diagnosis.discovery.forms import beyond
 from jaxident.effects.catalogue import BY_KIND
-from jaxident.effects.discovered import ACTS, SIGNALS
+from jaxident.effects.law_kinds import HEATS, SIGNALS, value_unit
 from jaxident.report.page import Figure, Section, Table
 from jaxident.report.words import number, percent, plain, together
 
 SIGNAL_WORDS = {
     "v": "speed v", "w": "turn rate w", "heading": "heading", "x": "position x", "y": "position y",
     "time": "session time", "push right": "push of the right wheel", "push left": "push of the left wheel",
-    "own speed": "speed of that wheel", "own push": "push of that wheel",
+    "own speed": "speed of that wheel", "own push": "push of that wheel", "since reversal": "time since a reversal",
+    **{name: f"mean square of that wheel's command over {tau:g} s" for name, tau in HEATS.items()},
 }  # fmt: skip
-TIMES_WORDS = {"1": "", "v": "speed times ", "w": "turn rate times "}
+TIMES_WORDS = {"1": "", "v": "speed times ", "w": "turn rate times ", "own push": "push of that wheel times "}
 SEEN = (
     "These laws are in no catalogue. They were found on the runs that fit, and runs that took no part in that confirm "
     "them. Each adds a curve of one signal, or a surface of two, at one place. The corrected model has them, and "
@@ -70,10 +71,9 @@ def _picture(shown: Shown) -> Figure:
     law = shown.law
     surface = bool(law.second_signal)
     figure, ax = plot.figure(size=(6.3, MAP_HEIGHT if surface else HEIGHT))
-    factor = {"1": "", "v": " per m/s", "w": " per rad/s"}[law.times]
     told = dataclasses.replace(law, value=beyond(law, shown.density))
     plot.discovered(told, shown.density, ax=ax, xlabel=f"{SIGNAL_WORDS[law.signal]} [{SIGNALS[law.signal]}]",
-                    ylabel=f"{law.acts_on}\n[{ACTS[law.acts_on]}{factor}]")  # fmt: skip
+                    ylabel=f"{law.acts_on}\n[{value_unit(law)}]")  # fmt: skip
     caption = (OF_MAP if surface else OF_CURVE) + REST
     return Figure(plot.image(figure), _place(shown.kind), caption)
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from jaxident.effects.checks import check_delay, check_effects
-from jaxident.effects.discovered import check_discovered
+from jaxident.effects.law_kinds import check_discovered
 from jaxident.errors import InputError
 from jaxident.robot.excitation import EXCITATIONS
 from jaxident.robot.model import Effect, Model, require_physical

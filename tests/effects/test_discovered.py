@@ -10,7 +10,8 @@ import jaxident as ji
 from jaxident.array_types import AT_REST, Pose
 from jaxident.diagnosis.discovery.candidates import KINDS
 from jaxident.effects.catalogue import BY_KIND
-from jaxident.effects.discovered import ACTS, MOST_KNOTS, MOST_LAWS, check_discovered, laws_of, shifted, with_laws
+from jaxident.effects.discovered import laws_of, shifted, with_laws
+from jaxident.effects.law_kinds import ACTS, MOST_KNOTS, MOST_LAWS, check_discovered
 from jaxident.errors import InputError
 from jaxident.estimation.ahead.beyond_range import beyond_range, signals
 from jaxident.estimation.ahead.stretches import Starts, every
@@ -23,6 +24,7 @@ from jaxident.robot.simulate import run_physical
 STEP, ROWS = 0.04, 200
 ROBOT = Model(STEP, Physical(np.array([3.0, 5.0]), np.array([[0.8, 0.78], [9.0, -9.2]])), np.array([0.08, 0.1]))
 TURNS, PUSHES = np.linspace(-4.0, 4.0, 9), np.linspace(-1.0, 1.0, 9)
+HEATS, SINCE = np.linspace(0.0, 0.5, 9), np.linspace(0.0, 2.0, 9)
 SURFACE = np.random.default_rng(8).normal(size=(5, 5))
 
 
@@ -46,6 +48,8 @@ LAWS = (
     ("pose ahead", "1", "x", PUSHES, 0.1 * PUSHES**2),
     ("pose to the left", "1", "heading", TURNS[1:-1], 0.03 * np.sin(TURNS[1:-1])),
     ("reported heading", "1", "y", PUSHES, 0.1 * PUSHES),
+    ("push of each wheel", "own push", "own heat 3 s", HEATS, -0.5 * HEATS),
+    ("acceleration along", "v", "since reversal", SINCE, -3.0 * np.exp(-SINCE / 0.4)),
     ("acceleration along", "v", "x", PUSHES[::2], SURFACE, None, "y", PUSHES[::2]),
     ("speed sideways", "v", "x", PUSHES[::2], 0.1 * SURFACE, None, "y", PUSHES[::2]),
 )
@@ -160,6 +164,8 @@ BAD = (
     ({"acts_on": "pose ahead"}, "error of the camera"),
     ({"acts_on": "push of each wheel"}, "push of each wheel"),
     ({"signal": "own push"}, "push of each wheel"),
+    ({"times": "own push"}, "own push times a curve of v"),
+    ({"acts_on": "push of each wheel", "signal": "own push", "times": "v"}, "v times a curve of own push"),
 )
 
 

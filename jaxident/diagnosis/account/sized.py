@@ -16,8 +16,7 @@ from jaxident.diagnosis.noise.variance_uncertainty import Draws, draw_laws, size
 from jaxident.diagnosis.preparation.prepare import Prepared
 from jaxident.diagnosis.preparation.translate import slopes_of
 from jaxident.effects.coordinates import COORDINATES
-from jaxident.effects.discovered import ACTS, value_name
-from jaxident.effects.effect import UNIT
+from jaxident.effects.law_kinds import value_name, value_scale
 from jaxident.robot.model import Model
 
 REPLAYS = 500
@@ -51,7 +50,8 @@ def _covariance(bending: Bending, model: Model, largest: float) -> tuple[tuple[s
     """Names and covariance of a model's parameters and its curves' values, in the user's units."""
     effects = [effect for effect in model.effects if effect.name in COORDINATES]
     names, slope = slopes_of(bending.fit, effects, largest)
-    units = [largest if ACTS[curve.kind.acts_on] == UNIT else 1.0 for curve in bending.curves for _ in curve.value]
+    kinds = [curve.kind for curve in bending.curves for _ in curve.value]
+    units = [value_scale(kind.acts_on, kind.times, largest) for kind in kinds]
     own, (rows, columns) = len(units), slope.shape
     whole = np.zeros((rows + own, columns + own))
     whole[:rows, :columns], whole[rows:, columns:] = slope, np.diag(units)

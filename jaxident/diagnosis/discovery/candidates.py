@@ -12,9 +12,11 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.diagnosis.fit.refit import Solution
 from jaxident.diagnosis.motion.linear import motion_of
+from jaxident.diagnosis.motion.paths import left_behind
 from jaxident.diagnosis.motion.responses import Responses
 from jaxident.diagnosis.motion.windows import Windows
-from jaxident.effects.discovered import AHEAD, ALONG, BY_CAMERA, HEADING, LEFT, SIDEWAYS, TURN, WHEELS, Laws
+from jaxident.effects.discovered import Laws
+from jaxident.effects.law_kinds import AHEAD, ALONG, BY_CAMERA, HEADING, HEATS, LEFT, SIDEWAYS, TURN, WHEELS
 
 KNOTS = 10
 """Of a curve. No other number was tried."""
@@ -24,10 +26,13 @@ INSIDE = (0.01, 0.99)
 """Quantiles of a signal between which its knots lie. No others were tried."""
 VARIED = 1e-6
 """A signal that spans less than this, in its own unit, tells no curve. No other value was tried."""
-OF_FORCE = ("v", "w", "heading", "x", "y", "time", "push right", "push left")
+OF_FORCE = ("v", "w", "heading", "x", "y", "time", "push right", "push left", "since reversal")
+ELSEWHERE = ("heading", "x", "y", "time", "since reversal")
+"""Of what is no speed."""
 SITE_OF_SIGNAL = {
     "v": "drive", "w": "drive", "heading": "contact", "x": "contact", "y": "contact", "time": "time",
-    "push right": "actuation", "push left": "actuation", "own speed": "drive", "own push": "actuation",
+    "push right": "actuation", "push left": "actuation", "since reversal": "contact", "own speed": "drive",
+    "own push": "actuation", **dict.fromkeys(HEATS, "actuation"),
 }  # fmt: skip
 """The site of a law that acts on accelerations or pushes, by its signal."""
 
@@ -59,11 +64,12 @@ class Kind(NamedTuple):
 
 KINDS = (
     *(Kind(act, "1", signal) for act in (ALONG, HEADING) for signal in OF_FORCE),
-    *(Kind(act, "v", signal) for act in (ALONG, HEADING) for signal in ("w", "heading", "x", "y", "time")),
-    *(Kind(act, "w", signal) for act in (ALONG, HEADING) for signal in ("v", "heading", "x", "y", "time")),
+    *(Kind(act, "v", signal) for act in (ALONG, HEADING) for signal in ("w", *ELSEWHERE)),
+    *(Kind(act, "w", signal) for act in (ALONG, HEADING) for signal in ("v", *ELSEWHERE)),
     *(Kind(SIDEWAYS, "v", signal) for signal in ("w", "heading", "x", "y", "time")),
     *(Kind(SIDEWAYS, "1", signal) for signal in ("w", "heading")),
     *(Kind(WHEELS, "1", signal) for signal in ("own speed", "own push")),
+    *(Kind(WHEELS, "own push", signal) for signal in HEATS),
     *(Kind(act, "1", signal) for act in (AHEAD, LEFT, TURN) for signal in ("heading", "x", "y")),
     *(Kind(act, times, "x", "y") for act, times in FLOOR),
     *(Kind(act, "1", *pair) for act in (ALONG, HEADING) for pair in (("v", "w"), ("push right", "push left"))),
@@ -97,14 +103,17 @@ def path_of(fit: Solution, windows: Windows, laws: Laws | None = None) -> Path:
     x, y, theta, v, w, push = (np.asarray(part) for part in motion)
     rates, gain = np.exp(fit.vector[:2]), fit.vector[2:6].reshape(2, 2)
     speeds = np.stack([rates[0] * v, rates[1] * w], axis=-1) @ np.linalg.pinv(gain).T
-    step = np.asarray(windows.step).T
+    step, past = np.asarray(windows.step).T, left_behind(windows)
     begin = windows.session[windows.run] + windows.t[windows.first, windows.run]
     time = begin[:, None] + np.cumsum(step, axis=1) - step
     heading = (theta + np.pi) % (2.0 * np.pi) - np.pi
     signals = {"1": np.ones_like(v), "v": v, "w": w, "heading": heading, "x": x, "y": y, "time": time,
-               "push right": push[..., 0], "push left": push[..., 1]}  # fmt: skip
+               "push right": push[..., 0], "push left": push[..., 1],
+               "since reversal": np.asarray(past.since).T}  # fmt: skip
+    own = {"1": np.ones_like(push), "own speed": speeds, "own push": push}
+    own |= dict(zip(HEATS, np.asarray(past.heat).transpose(1, 3, 0, 2), strict=True))
     seen = np.repeat(np.asarray(windows.seen).T, 3, axis=1)
-    return Path(signals, {"own speed": speeds, "own push": push}, gain, seen)
+    return Path(signals, own, gain, seen)
 
 
 def candidates(path: Path, responses: Responses) -> Iterator[Candidate]:
@@ -138,6 +147,7 @@ def columns_of(kind: Kind, at: tuple[Any, ...], path: Path, responses: Responses
     signals = _signals(kind, path)
     shape = hats(signals[0], at[0])
     if kind.acts_on == WHEELS:
+        shape = shape * path.own[kind.times][..., None]
         along, heading = (np.einsum("wrsk,s->wrk", shape, row) for row in path.gain)
         return responses.along @ along + responses.heading @ heading
     for signal, knots in zip(signals[1:], at[1:], strict=True):

@@ -13,7 +13,8 @@ from jaxident.diagnosis.motion.linear import Gram, Linear, gram, linearise
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.noise.law import Law
 from jaxident.effects.coordinates import limits
-from jaxident.effects.discovered import Laws, laws_of, scaled
+from jaxident.effects.discovered import Laws, laws_of
+from jaxident.effects.law_kinds import scaled
 from jaxident.robot.model import Discovered
 
 MOST_STEPS = 10

@@ -6,14 +6,14 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.effects.discovered import ALONG, HEADING
+from jaxident.effects.law_kinds import ALONG, HEADING, WHEELS
 from jaxident.robot.model import Discovered
 
 LIKE = 0.8
 """Part of a curve that a form has to explain before it is told. No other value was tried."""
 SIMPLER = 0.01
 """By which a form further down the list has to explain more. No other value was tried."""
-FORCES = (ALONG, HEADING)
+FORCES = (ALONG, HEADING, WHEELS)
 NOMINAL = ("v", "w", "push right", "push left", "own speed", "own push")
 """Signals on which a force of the nominal robot depends, in a straight line."""
 BENDS = np.linspace(0.1, 0.9, 17)
@@ -39,9 +39,14 @@ BENT: Forms = {
     "c max(s0 - s, 0)": lambda s, s0: np.maximum(s0 - s, 0.0),
     "c max(|s| - s0, 0)": lambda s, s0: np.maximum(np.abs(s) - s0, 0.0),
     "c from s0 on": lambda s, s0: (s >= s0).astype(float),
+    "c exp(-s / s0)": lambda s, s0: np.exp(-s / s0),
 }
 """Forms that begin at some s0."""
-ANGLES = ("c sin(s)", "c cos(s)", "c sin(2 s)", "c cos(2 s)")
+ONLY_OF = {
+    "c sin(s)": "heading", "c cos(s)": "heading", "c sin(2 s)": "heading", "c cos(2 s)": "heading",
+    "c exp(-s / s0)": "since reversal",
+}  # fmt: skip
+"""Forms of one signal alone."""
 PRODUCTS: Forms = {
     "c s t": lambda s, t: s * t,
     "c |s| t": lambda s, t: np.abs(s) * t,
@@ -86,12 +91,17 @@ def _of_one(law: Discovered) -> Tried:
     """Forms of one signal: name, numbers but for c, and values (knots,) with c = 1."""
     s = np.asarray(law.at)
     for name, shape in SHAPES.items():
-        if name not in ANGLES or law.signal == "heading":
+        if _is_for(name, law):
             yield name, {}, shape(s, s)
     for name, shape in BENT.items():
         for s0 in s[0] + BENDS * np.ptp(s):
-            if "|s|" not in name or s0 > 0.0:
+            if _is_for(name, law) and ("|s|" not in name or s0 > 0.0):
                 yield name, {"s0": float(s0)}, shape(s, s0)
+
+
+def _is_for(name: str, law: Discovered) -> bool:
+    """Whether a form is tried for a law's signal."""
+    return ONLY_OF.get(name, law.signal) == law.signal
 
 
 def _of_two(law: Discovered) -> Tried:

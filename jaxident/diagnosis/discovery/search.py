@@ -26,7 +26,7 @@ from jaxident.diagnosis.motion.linear import without_starts
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.diagnosis.noise.sizing import size_noise
-from jaxident.effects.discovered import MOST_LAWS
+from jaxident.effects.law_kinds import MOST_LAWS
 
 PRICE = float(np.log(len(KINDS)))
 """Of having looked at all kinds of laws."""

@@ -9,6 +9,7 @@ from jaxident.effects.coordinates import by_effect
 from jaxident.effects.discovered import Laws, with_laws
 from jaxident.effects.fast_input import SUBSTEPS, Push, pushes
 from jaxident.effects.fast_motion import Row, advance_row, drive_of, lags_of, report, rolling
+from jaxident.effects.past import Past, past_of
 from jaxident.numerics import wrap
 from jaxident.robot.drive import rim_motion
 
@@ -51,6 +52,13 @@ def rolled(vector: Array, starts: Array, push: Push, windows: Windows, laws: Law
     return rim_motion(drive_of(vector), states.v, states.w, Wheels(sum(excess[0::2]), sum(excess[1::2])))
 
 
+def left_behind(windows: Windows) -> Past:
+    """What the commands left behind at each row of the windows (rows, ..., windows)."""
+    places = jnp.minimum(windows.first + jnp.arange(len(windows.step))[:, None], len(windows.t) - 1)
+    since, heat = past_of(windows.t, windows.command)
+    return Past(since[places, windows.run], jnp.moveaxis(heat, -1, 1)[places, windows.run].transpose(0, 2, 3, 1))
+
+
 def _moved(vector: Array, starts: Array, push: Push, windows: Windows, laws: Laws | None) -> tuple[State, list]:
     """True states, and by how much each wheel turns faster than the ground [unit]."""
     settings, drive, part = with_laws(by_effect(vector), laws), drive_of(vector), windows.step / SUBSTEPS
@@ -61,5 +69,5 @@ def _moved(vector: Array, starts: Array, push: Push, windows: Windows, laws: Law
         state, excess = carry
         return advance_row(settings, drive, state, excess, row), (state, excess)
 
-    rows = Row(push.mean, push.slope, part, lags_of(drive, part), begin)
+    rows = Row(push.mean, push.slope, part, lags_of(drive, part), begin, None if laws is None else left_behind(windows))
     return jax.lax.scan(body, (State(*starts), rolling(starts[0])), rows)[1]

@@ -21,7 +21,7 @@ from jaxident.diagnosis.noise.law import whitener_of
 from jaxident.diagnosis.planning.question import Question, ask, check_names, expected_size, noise_of
 from jaxident.diagnosis.planning.trial_inputs import ORDINARY, draw, make, vary
 from jaxident.effects.coordinates import NOMINAL
-from jaxident.effects.discovered import check_discovered
+from jaxident.effects.law_kinds import check_discovered
 from jaxident.log import Log, make_log
 from jaxident.numerics import require_float64
 from jaxident.robot.model import Model

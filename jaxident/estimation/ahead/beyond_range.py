@@ -3,7 +3,7 @@
 import numpy as np
 
 from jaxident.array_types import Array, Wheels
-from jaxident.effects.discovered import SIGNALS, knots_by_signal
+from jaxident.effects.law_kinds import HEATS, SIGNALS, knots_by_signal
 from jaxident.estimation.ahead.stretches import Starts, cut_stretches
 from jaxident.log import Log
 from jaxident.numerics import wrap
@@ -46,7 +46,7 @@ def signals(model: Model, log: Log, starts: Starts, pose: Array, session_time: f
     below each other where a law looks at each by itself. Speeds are those between two rows."""
     rows, drive = np.arange(1, pose.shape[1] + 1)[:, None], require_physical(model)
     lengths = np.array([len(run.t) for run in log.runs()])[starts.run]
-    stretch = cut_stretches(log, starts, 0, 0, pose.shape[1], session_time)
+    stretch = cut_stretches(log, starts, 0, 0, pose.shape[1], session_time, past=True)
     x, y, theta = np.where(starts.row + rows < lengths, np.moveaxis(pose, (2, 1), (0, 1)), np.nan)
     t, turned = stretch.t[1:], np.asarray(wrap(np.diff(theta, axis=0)))
     middle = theta[:-1] + 0.5 * turned
@@ -54,9 +54,11 @@ def signals(model: Model, log: Log, starts: Starts, pose: Array, session_time: f
     w = turned / np.diff(t, axis=0)
     command = np.where(np.isfinite(x), np.moveaxis(stretch.command[1:], -1, 0), np.nan)
     push = [np.asarray(wheel) for wheel in effective_command(Wheels(*command), model.dead_zone)]
+    heat = np.concatenate([stretch.heat[1:, :, number].swapaxes(0, 1) + 0.0 * x for number in (0, 1)], axis=1)
     speeds = [np.asarray(wheel) for wheel in wheel_speeds(drive, v, w)]
     return {
         "v": v, "w": w, "heading": np.asarray(wrap(theta)), "x": x, "y": y,
         "time": stretch.session + t + 0.0 * x, "push right": push[0], "push left": push[1],
-        "own speed": np.concatenate(speeds), "own push": np.concatenate(push),
+        "since reversal": stretch.since[1:] + 0.0 * x, "own speed": np.concatenate(speeds),
+        "own push": np.concatenate(push), **dict(zip(HEATS, heat, strict=True)),
     }  # fmt: skip

@@ -69,7 +69,8 @@ def run_ahead(model: Model, log: Log, starts: Starts, horizon: int, *, burn_in: 
         log = blind(log, repeats(log))
     lost = chance[BY_CHANCE["lost"]]["probability"] if BY_CHANCE["lost"] in chance else None
     filler = -(first + 1 + horizon) % ROWS
-    stretch = cut_stretches(log, starts, first - before, before, horizon + filler, session_time)
+    stretch = cut_stretches(log, starts, first - before, before, horizon + filler, session_time,
+                            past=bool(model.discovered))  # fmt: skip
     ahead = slice(first + 1, first + 1 + horizon)
 
     def run(robot: Model, stretch: Stretch) -> Run:

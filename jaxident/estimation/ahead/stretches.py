@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
+from jaxident.effects.past import NO_PAST, past_of_run
 from jaxident.errors import InputError
 from jaxident.estimation.ahead.filtered_state import Stretch
 from jaxident.log import Log, join
@@ -15,7 +16,7 @@ FEWEST = 3
 """Poses below which speeds are not guessed: those of the run-up stay."""
 
 
-AXES = (1, 0, 1, 1, 1, 0, 1, 0)
+AXES = (1, 0, 1, 1, 1, 0, 1, 0, 1, 3)
 """The axis of each part of a `Stretch` along which stretches lie side by side."""
 
 
@@ -40,23 +41,26 @@ def until_last_start(log: Log, starts: Starts) -> Log:
     return join([runs[k].rows(0, int(starts.row[starts.run == k].max()) + 1) for k in np.unique(starts.run)])
 
 
-def cut_stretches(log: Log, starts: Starts, lead: int, before: int, horizon: int, session_time: float) -> Stretch:
+def cut_stretches(
+    log: Log, starts: Starts, lead: int, before: int, horizon: int, session_time: float, *, past: bool = False
+) -> Stretch:
     """Stretches (rows, starts) from `lead` + `before` rows before each start to `horizon` rows after it.
 
     Poses are known up to the start, from `before` rows on. Rows before the beginning of a run hold no command and no
     pose, those past its end repeat, time going on. session_time [s]: that of the first row of the log; runs follow
-    each other.
+    each other. past: whether a law asks for what the commands left behind.
     """
     runs = log.runs()
     passed = session_time + np.concatenate([[0.0], np.cumsum([run.t[-1] - run.t[0] for run in runs])])
     parts = [
-        _of_run(runs[k], starts.row[starts.run == k], lead, before, horizon, passed[k]) for k in np.unique(starts.run)
+        _of_run(runs[k], starts.row[starts.run == k], lead, before, horizon, passed[k], past)
+        for k in np.unique(starts.run)
     ]
     columns = zip(zip(*parts, strict=True), AXES, strict=True)
     return Stretch(*(np.concatenate(column, axis=axis) for column, axis in columns))
 
 
-def _of_run(run: Log, starts: Array, lead: int, before: int, horizon: int, session: float) -> Stretch:
+def _of_run(run: Log, starts: Array, lead: int, before: int, horizon: int, session: float, past: bool) -> Stretch:
     """The stretches of one run."""
     rows = starts + np.arange(-lead - before, horizon + 1)[:, None]
     inside = np.clip(rows, 0, len(run.t) - 1)
@@ -68,7 +72,10 @@ def _of_run(run: Log, starts: Array, lead: int, before: int, horizon: int, sessi
     seen = np.isfinite(pose).all(axis=-1) & (rows >= 0) & (rows <= starts) & (rows >= starts - before)
     pose = np.where(seen[..., None], pose, 0.0)
     begin = np.maximum(lead + before - starts, 0)
-    found = Stretch(t - t[0], session + t[0] - run.t[0], command, pose, seen, np.argmax(seen, axis=0), None, begin)
+    since, heat = past_of_run(np.asarray(run.t), sent) if past else NO_PAST
+    kept = inside if past else inside[:0]
+    found = Stretch(t - t[0], session + t[0] - run.t[0], command, pose, seen, np.argmax(seen, axis=0), None, begin,
+                    since[kept], np.moveaxis(heat[kept], 1, -1))  # fmt: skip
     return found._replace(speeds=_guess(found))
 
 

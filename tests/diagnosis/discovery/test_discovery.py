@@ -149,7 +149,7 @@ def test_a_wild_curve_looks_like_nothing():
 
 
 def test_every_kind_can_be_run():
-    from jaxident.effects.discovered import check_discovered
+    from jaxident.effects.law_kinds import check_discovered
 
     for kind in KINDS:
         check_discovered([as_law(surface_of(kind, S) if kind.second_signal else curve_of(kind, AT))])

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import jaxident as ji
-from jaxident.effects.discovered import value_name
-from jaxident.estimation.ahead.parameter_spread import directions, parameter_values, with_values
+from jaxident.effects.law_kinds import value_name
+from jaxident.estimation.ahead.parameter_spread import MOST, directions, parameter_values, with_values
 from jaxident.estimation.ahead.run_ahead import run_ahead
 from jaxident.estimation.ahead.stretches import every
 from jaxident.robot.drive import Physical
@@ -41,6 +41,24 @@ def test_directions_add_up_to_the_covariance():
     scale = np.sqrt(np.diagonal(model.covariance))
     np.testing.assert_allclose(moved.T @ moved / scale / scale[:, None], model.covariance / scale / scale[:, None],
                                atol=1e-6)  # fmt: skip
+
+
+def test_many_directions_are_mixed_into_a_few_that_spread_as_much():
+    """A surface has 64 values. A sum of squares over MOST mixtures is off by a share of sqrt(2 / MOST), one standard
+    deviation; so is that of what any linear prediction makes of them."""
+    knots, rng = np.linspace(-1.0, 1.0, 8), np.random.default_rng(5)
+    surface = Discovered("acceleration along", "v", "x", knots, rng.normal(size=(8, 8)), None, "y", knots)
+    order = tuple(value_name(0, knot) for knot in range(64))
+    root = rng.normal(size=(64, 64)) * rng.uniform(0.1, 1.0, 64)
+    model = dataclasses.replace(uncertain(), discovered=(surface,), effects=(), covariance=root @ root.T,
+                                parameter_order=order)  # fmt: skip
+    here = np.ravel(surface.value)
+    moved = np.array([(np.ravel(other.discovered[0].value) - here) / size for other, size in directions(model)])
+    assert len(moved) == MOST
+    looks = rng.normal(size=(64, 200))
+    ratio = np.sum((moved @ looks) ** 2, axis=0) / np.sum(looks * (model.covariance @ looks), axis=0)
+    assert abs(ratio.mean() - 1.0) < 0.1
+    assert ratio.std() < np.sqrt(2.0 / MOST)
 
 
 def test_values_that_are_set_are_there():

@@ -1,0 +1,113 @@
+"""What a discovered law may act on and depend on, what it is called, and which laws no program can run."""
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from jaxident.effects.effect import UNIT
+from jaxident.effects.past import HEAT_TIMES
+from jaxident.errors import InputError
+from jaxident.robot.model import Discovered
+
+SQUARE = f"{UNIT}^2"
+HEATS = {f"own heat {tau:g} s": tau for tau in HEAT_TIMES}
+"""Signals that remember the wheel's own command, and the time constant [s] of each."""
+DISCOVERED = "discovered"
+"""The key of laws among the settings of a program."""
+MOST_LAWS, MOST_KNOTS, MOST_SECOND = 3, 16, 8
+"""Laws of one model, knots of a curve, and knots of a surface along each of its signals. Every set of curves runs
+through one compiled program, every set with a surface through another."""
+ACTS = {
+    "acceleration along": "m/s^2", "acceleration in heading": "rad/s^2", "speed sideways": "m/s",
+    "push of each wheel": UNIT, "pose ahead": "m", "pose to the left": "m", "reported heading": "rad",
+}  # fmt: skip
+"""What a law may add to, and the unit."""
+ALONG, HEADING, SIDEWAYS, WHEELS, AHEAD, LEFT, TURN = ACTS
+BY_CAMERA = (AHEAD, LEFT, TURN)
+SIGNALS = {
+    "v": "m/s", "w": "rad/s", "heading": "rad", "x": "m", "y": "m", "time": "s", "push right": UNIT,
+    "push left": UNIT, "since reversal": "s", "own speed": UNIT, "own push": UNIT, **dict.fromkeys(HEATS, SQUARE),
+}  # fmt: skip
+"""What a curve may depend on, and the unit. time: session time. since reversal: since the commands' sum last changed
+its sign (`past`). own: of the wheel that is pushed; its speed is in the commands that hold it, its heat a mean of its
+squared command over some seconds."""
+OF_CAMERA = ("heading", "x", "y")
+"""Signals that a camera's error may depend on."""
+TIMES = {"1": "", "v": "m/s", "w": "rad/s", "own push": UNIT}
+"""What a curve may be multiplied with, and the unit."""
+
+
+def value_name(law: int, knot: int) -> str:
+    """What a model's covariance calls the value of a law at one of its knots, both counted from 0; knots of a surface
+    row by row."""
+    return f"{DISCOVERED}.{law + 1}.{knot + 1}"
+
+
+def knots_by_signal(law: Discovered) -> dict[str, np.ndarray]:
+    """Knots of a law's curve by its signal, or of its surface by both."""
+    second = {law.second_signal: np.asarray(law.second_at, float)} if law.second_signal else {}
+    return {law.signal: np.asarray(law.at, float)} | second
+
+
+def check_discovered(laws: Sequence[Discovered]) -> None:
+    """InputError for laws that no program can run: too many, of an unknown kind, or with knots out of order."""
+    if len(laws) > MOST_LAWS:
+        raise InputError(f"{len(laws)} discovered laws; at most {MOST_LAWS} are possible")
+    for law in laws:
+        _check_kind(law)
+        knots, most = knots_by_signal(law).values(), MOST_SECOND if law.second_signal else MOST_KNOTS
+        for at in knots:
+            if not 2 <= len(at) <= most:
+                raise InputError(f"discovered: {len(at)} knots; 2 to {most} are possible")
+            if not (np.all(np.isfinite(at)) and np.all(np.diff(at) > 0.0)):
+                raise InputError("discovered: knots are out of order, or one is not finite")
+        shape = tuple(map(len, knots))
+        if np.shape(law.value) != shape:
+            given, asked = (" x ".join(map(str, each)) for each in (np.shape(law.value), shape))
+            raise InputError(f"discovered: {asked} knots and {given} values; as many are needed")
+        if not np.all(np.isfinite(law.value)):
+            raise InputError("discovered: a value is not finite")
+
+
+def _check_kind(law: Discovered) -> None:
+    choices = (("acts_on", law.acts_on, ACTS), ("times", law.times, TIMES), ("signal", law.signal, SIGNALS),
+               ("second_signal", law.second_signal, ("", *SIGNALS)))  # fmt: skip
+    for key, value, known in choices:
+        if value not in known:
+            raise InputError(f"discovered: {key} is {value!r}; known are {', '.join(known)}")
+    signals = {law.signal, law.second_signal} - {""}
+    by_camera, own = law.acts_on in BY_CAMERA, any(signal.startswith("own ") for signal in signals)
+    if by_camera and (not signals <= set(OF_CAMERA) or law.times != "1"):
+        raise InputError(f"discovered: an error of the camera is 1 times a curve of {' or '.join(OF_CAMERA)}")
+    if not own == (law.acts_on == WHEELS) == (own and not law.second_signal):
+        raise InputError("discovered: a push of each wheel is a curve of the wheel's own speed, push or heat")
+    if law.times not in (("1", "own push") if own else ("1", "v", "w")):
+        raise InputError(f"discovered: {law.times} times a curve of {law.signal}: no program multiplies these")
+    if law.signal == law.second_signal:
+        raise InputError(f"discovered: a surface of {law.signal} and {law.signal}; two signals are needed")
+
+
+def scaled(law: Discovered, factor: float) -> Discovered:
+    """The law for commands that are `factor` times as large."""
+    up = value_scale(law.acts_on, law.times, factor)
+    spread = None if law.standard_deviation is None else up * np.asarray(law.standard_deviation)
+    at, *second = (_scale(SIGNALS[signal], factor) * knots for signal, knots in knots_by_signal(law).items())
+    return dataclasses.replace(
+        law, at=at, value=up * np.asarray(law.value, float), standard_deviation=spread,
+        second_at=second[0] if second else None,
+    )  # fmt: skip
+
+
+def value_scale(acts_on: str, times: str, factor: float) -> float:
+    """How many times as large a law's values are for commands that are `factor` times as large."""
+    return _scale(ACTS[acts_on], factor) / _scale(TIMES[times], factor)
+
+
+def _scale(unit: str, factor: float) -> float:
+    return {UNIT: factor, SQUARE: factor**2}.get(unit, 1.0)
+
+
+def value_unit(law: Discovered) -> str:
+    """The unit of a law's values."""
+    return f"{ACTS[law.acts_on]} per {TIMES[law.times]}" if TIMES[law.times] else ACTS[law.acts_on]

@@ -1,0 +1,73 @@
+"""What the commands leave behind, against loops that are written from the equations."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from jaxident.effects.past import HEAT_TIMES, LONGEST, past_of, past_of_run
+
+
+def drive(rows: int):
+    """Uneven times, and commands held for a while, some of them zero."""
+    rng = np.random.default_rng(rows)
+    t = np.cumsum(rng.uniform(0.02, 0.08, rows))
+    held = rng.uniform(-1.0, 1.0, (rows // 7 + 1, 2)) * (rng.random((rows // 7 + 1, 1)) < 0.8)
+    return t, np.repeat(held, 7, axis=0)[:rows]
+
+
+def slow_since(t, command):
+    """By looking back from each row for the last change of direction."""
+    step = np.diff(t, append=2.0 * t[-1] - t[-2])
+    sums = command.sum(axis=1)
+    found = []
+    for k in range(len(t)):
+        signs = [(j, np.sign(sums[j])) for j in range(k + 1) if sums[j] != 0.0]
+        turns = [j for (_, before), (j, now) in itertools.pairwise(signs) if now != before]
+        since = t[k] - t[turns[-1]] if turns else LONGEST
+        found.append(min(since + 0.5 * step[k], LONGEST))
+    return np.array(found)
+
+
+def slow_heat(t, command, tau, parts=400):
+    """By small steps of Euler's method."""
+    step = np.diff(t, append=2.0 * t[-1] - t[-2])
+    heat, found = np.zeros(2), []
+    for h, u in zip(step, command, strict=True):
+        for part in range(parts):
+            if part == parts // 2:
+                found.append(heat.copy())
+            heat = heat + h / parts * (u**2 - heat) / tau
+    return np.array(found)
+
+
+def test_the_time_since_a_reversal_is_that_of_a_search_backwards():
+    t, command = drive(200)
+    np.testing.assert_allclose(past_of(t, command).since, slow_since(t, command), atol=1e-12)
+    assert past_of(t, command).since.min() < 0.1
+
+
+@pytest.mark.parametrize("number", range(len(HEAT_TIMES)))
+def test_heat_follows_its_equation(number):
+    t, command = drive(100)
+    found = np.asarray(past_of(t, command).heat)[:, number]
+    np.testing.assert_allclose(found, slow_heat(t, command, HEAT_TIMES[number]), atol=1e-4)
+
+
+@pytest.mark.parametrize("rows", [2, 511, 512, 513, 1400])
+def test_runs_that_are_filled_up_have_the_same_past(rows):
+    t, command = drive(rows)
+    whole, plain = past_of_run(t, command), past_of(t, command)
+    assert len(whole.since) == rows
+    # the last row's step is not known; the plain one guesses it
+    np.testing.assert_allclose(whole.since[:-1], plain.since[:-1], atol=1e-12)
+    np.testing.assert_allclose(whole.heat[:-1], plain.heat[:-1], atol=1e-12)
+
+
+def test_runs_side_by_side_are_those_alone():
+    (t, one), (_, other) = drive(60), drive(61)
+    both = past_of(np.stack([t, t], axis=1), np.stack([one, other[:60]], axis=1))
+    for k, command in enumerate((one, other[:60])):
+        alone = past_of(t, command)
+        np.testing.assert_allclose(both.since[:, k], alone.since)
+        np.testing.assert_allclose(both.heat[..., k], alone.heat)
