@@ -23,7 +23,8 @@ NO_SIZE = 1e-6
 
 def directions(model: Model) -> list[tuple[Model, float]]:
     """Robots moved along the independent directions of the model's covariance, or along mixtures of these (`MOST`), and
-    by how many deviations each; none for a model without. What changes from the model to one of them, over that number, is one deviation's worth."""
+    by how many deviations each; none for a model without. What changes from the model to one of them, over that number,
+    is one deviation's worth."""
     values = parameter_values(model)
     own = [k for k, name in enumerate(model.parameter_order) if name in values]
     if model.covariance is None or not own:
