@@ -64,6 +64,7 @@ def offered(finding, rng) -> dict[str, float]:
     """What each placebo is worth, in log evidence, the better of both forces; above SURE it would be taken."""
     from jaxident.diagnosis.causes.settled import whiten
     from jaxident.diagnosis.discovery.candidates import INSIDE, KINDS, KNOTS, hats, path_of
+    from jaxident.diagnosis.discovery.curves import precision
     from jaxident.diagnosis.discovery.search import _base, _beside
     from jaxident.diagnosis.motion.responses import respond
 
@@ -76,8 +77,9 @@ def offered(finding, rng) -> dict[str, float]:
     worth = {}
     for kind in PLACEBOS:
         signal = np.interp(now, *placebo(kind, rng, float(now.max())))
-        shape = hats(signal, np.linspace(*np.quantile(signal, INSIDE), KNOTS))
-        bent = [_beside(data, fit, base, prior, part @ shape) for part in (responses.along, responses.heading)]
+        at = np.linspace(*np.quantile(signal, INSIDE), KNOTS)
+        parts = (part @ hats(signal, at) for part in (responses.along, responses.heading))
+        bent = [_beside(data, fit, base, prior, columns, precision((at,))) for columns in parts]
         price = np.log(len(KINDS) + 2 * len(PLACEBOS))
         worth[kind] = max(min(each.evidence - price, each.held_out) for each in bent)
     return worth

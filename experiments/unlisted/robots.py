@@ -1,18 +1,9 @@
-"""Robots whose effect stands in no catalogue: what does a diagnosis discover, and what does that bring on fresh runs?
+"""A simulator of robots whose effect stands in no catalogue: small steps of the midpoint rule, NumPy alone.
 
-    python -m experiments.unlisted --kinds patch castor --seeds 3 --out FOUND
-
-A small simulator of its own drives each robot from one random place in a room to the next: six runs to diagnose, four
-fresh ones to predict 1 s ahead. Each kind below adds accelerations, or changes what drives the wheels. `achieved` is
-what the corrected model takes away of the nominal model's squared error on the fresh runs, beyond what a model that
-knows the effect leaves (the camera's noise and slip). `experiments/discovered.md` tells what came out.
+Each kind adds accelerations, or changes what drives the wheels. A driver leads the robot from one random place in a
+room to the next.
 """
 
-import argparse
-import json
-import multiprocessing
-import pathlib
-import time
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -23,6 +14,8 @@ ROOM = 0.8
 """Half the side of the room [m]."""
 NOISE = (4e-4, 3e-3)
 """Camera noise [m, rad]."""
+HEAT_TIME = 6.0
+"""Of the motors [s]."""
 SLIP = (0.003, 0.015)
 """Density of random accelerations along [m/s^1.5] and in heading [rad/s^1.5]."""
 
@@ -39,11 +32,12 @@ class Now(NamedTuple):
     push: np.ndarray
     angle: np.ndarray
     heat: np.ndarray
-    reversed: np.ndarray
+    since: np.ndarray
     time: np.ndarray
 
 
 Added = tuple[np.ndarray | float, np.ndarray | float]
+"""Accelerations along [m/s^2] and in heading [rad/s^2]."""
 
 
 def _patch(now: Now, size: float, rng) -> Added:
@@ -57,8 +51,8 @@ def _swirl(now: Now, size: float, rng) -> Added:
     return 0.0, 4.0 * size * now.v * (now.x * np.cos(now.theta) + now.y * np.sin(now.theta))
 
 
-def _tilt(now: Now, size: float, rng) -> Added:
-    """A floor like a saddle."""
+def _saddle(now: Now, size: float, rng) -> Added:
+    """A floor like a saddle: it pulls by place and direction at once."""
     return 0.5 * size * (now.x * np.cos(now.theta) - now.y * np.sin(now.theta)), 0.0
 
 
@@ -69,7 +63,9 @@ def _turning(now: Now, size: float, rng) -> Added:
 
 def _friction(now: Now, size: float, rng) -> Added:
     """A rubbing seal: a drag that hardly grows with speed."""
-    return -0.25 * size * np.sign(now.v) * np.abs(now.v / 0.1) ** 0.4, -1.0 * size * np.sign(now.w) * np.abs(now.w) ** 0.4
+    return -0.25 * size * np.sign(now.v) * np.abs(now.v / 0.1) ** 0.4, -1.0 * size * np.sign(now.w) * np.abs(
+        now.w
+    ) ** 0.4
 
 
 def _coupled(now: Now, size: float, rng) -> Added:
@@ -79,7 +75,7 @@ def _coupled(now: Now, size: float, rng) -> Added:
 
 def _castor(now: Now, size: float, rng) -> Added:
     """A castor that swings round after a reversal holds the robot back for a while."""
-    swing = np.exp(-now.reversed / 0.4)
+    swing = np.exp(-now.since / 0.4)
     return -5.0 * size * swing * now.v, 2.0 * size * swing * np.sign(now.v)
 
 
@@ -113,15 +109,16 @@ def _same(push: np.ndarray, now: Now, size: float) -> np.ndarray:
 
 
 FORCES: dict[str, Callable[[Now, float, np.random.Generator], Added]] = {
-    "patch": _patch, "swirl": _swirl, "saddle": _tilt, "turning": _turning, "friction": _friction, "coupled": _coupled,
-    "castor": _castor, "bumps": _bumps,
+    "patch": _patch, "swirl": _swirl, "saddle": _saddle, "turning": _turning, "friction": _friction,
+    "coupled": _coupled, "castor": _castor, "bumps": _bumps,
 }  # fmt: skip
 INPUTS: dict[str, Callable[[np.ndarray, Now, float], np.ndarray]] = {"hot": _hot, "cogs": _cogs, "oval": _oval}
-KINDS = (*FORCES, *INPUTS)
+KINDS = {**{name: law.__doc__ for name, law in (FORCES | INPUTS).items()}, "nothing": "The nominal robot."}
+"""What may be hidden in a robot, in words."""
 
 
 class Robot(NamedTuple):
-    """Rates [1/s], gains (2, 2), dead zones (2,), wheel radius [m], delay of the commands in rows."""
+    """Rates (2,) [1/s], gains (2, 2), dead zones (2,), wheel radius and track [m]."""
 
     rate: np.ndarray
     gain: np.ndarray
@@ -131,6 +128,7 @@ class Robot(NamedTuple):
 
 
 def draw_robot(rng) -> Robot:
+    """A small robot as it may come, both wheels nearly alike."""
     rate = rng.uniform(2.0, 6.0, 2)
     top = rng.uniform(0.35, 0.6), rng.uniform(2.0, 4.0)
     even = 1.0 + rng.uniform(-0.05, 0.05, 2)
@@ -175,88 +173,21 @@ def drive(robot: Robot, kind: str, size: float, runs: int, seed: int, first: flo
 def _step(robot: Robot, now: Now, command: np.ndarray, jolt: np.ndarray, effect, h: float, rng) -> Now:
     """One midpoint step of h [s]."""
     force, change, size = effect
-    m = np.sign(command) * np.maximum(np.abs(command) - robot.zone[:, None], 0.0)
-    m = change(m, now, size)
-    pull = robot.gain @ m
+    push = np.sign(command) * np.maximum(np.abs(command) - robot.zone[:, None], 0.0)
+    push = change(push, now, size)
+    pull = robot.gain @ push
 
-    def rates(v, w, there):
+    def rates(there: Now):
         along, heading = force(there, size, rng)
-        return pull[0] - robot.rate[0] * v + along + jolt[0], pull[1] - robot.rate[1] * w + heading + jolt[1]
+        return np.array([
+            there.v * np.cos(there.theta), there.v * np.sin(there.theta), there.w,
+            pull[0] - robot.rate[0] * there.v + along + jolt[0], pull[1] - robot.rate[1] * there.w + heading + jolt[1],
+        ])  # fmt: skip
 
-    dv, dw = rates(now.v, now.w, now)
-    middle = now._replace(v=now.v + 0.5 * h * dv, w=now.w + 0.5 * h * dw, theta=now.theta + 0.5 * h * now.w,
-                          x=now.x + 0.5 * h * now.v * np.cos(now.theta), y=now.y + 0.5 * h * now.v * np.sin(now.theta))  # fmt: skip
-    dv, dw = rates(middle.v, middle.w, middle)
-    v, w = now.v + h * dv, now.w + h * dw
+    state = np.array(now[:5])
+    middle = now._replace(**dict(zip(Now._fields[:5], state + 0.5 * h * rates(now), strict=True)))
+    x, y, theta, v, w = state + h * rates(middle)
     rolled = np.stack([middle.v + 0.5 * robot.track * middle.w, middle.v - 0.5 * robot.track * middle.w]) / robot.radius
-    return Now(
-        now.x + h * middle.v * np.cos(middle.theta), now.y + h * middle.v * np.sin(middle.theta), now.theta + h * middle.w,
-        v, w, m, now.angle + h * rolled, now.heat + h / 6.0 * (m**2 - now.heat),
-        np.where(v * now.v < 0.0, 0.0, now.reversed + h), now.time + h,
-    )  # fmt: skip
-
-
-def ahead(model, logs, session: float) -> np.ndarray:
-    """Squared errors (starts, 3) 1 s ahead over the camera's variances, on free runs of logs."""
-    import jaxident as ji
-    from jaxident.numerics import wrap
-
-    found = []
-    for log in logs:
-        run = ji.predict(model, log, 20, burn_in=20)
-        last = np.flatnonzero(run.step == 20)
-        row = run.start[last] + 20
-        apart = np.stack([np.asarray(getattr(run, name))[last] - np.asarray(getattr(log, name))[row]
-                          for name in ("x", "y", "theta")], axis=1)  # fmt: skip
-        apart[:, 2] = np.asarray(wrap(apart[:, 2]))
-        found.append((apart / np.array([NOISE[0], NOISE[0], NOISE[1]])) ** 2)
-    return np.concatenate(found)
-
-
-def one(job: tuple[str, int, float]) -> dict:
-    """What a diagnosis of one robot finds, and what that brings on fresh runs."""
-    import jaxident as ji
-
-    kind, seed, size = job
-    ji.start_jax()
-    from jaxident.log import make_log
-
-    def as_log(rows):
-        return make_log(rows[:, 0], rows[:, 1], rows[:, 2], *rows[:, 3:].T)
-
-    robot = draw_robot(np.random.default_rng([seed, 1]))
-    begin = time.perf_counter()
-    found = ji.diagnose([as_log(rows) for rows in drive(robot, kind, size, RUNS, 1000 * seed + 2)])
-    seconds = time.perf_counter() - begin
-    fresh = [as_log(rows) for rows in drive(robot, kind, size, FRESH, 1000 * seed + 3, STEP * ROWS * RUNS)]
-    errors = {name: float(np.mean(ahead(model, fresh, 0.0))) for name, model in (
-        ("nominal", found.nominal_model), ("corrected", found.corrected_model))}  # fmt: skip
-    return {
-        "kind": kind, "seed": seed, "size": size, "seconds": round(seconds, 1), "verdict": found.verdict,
-        "named": list(found.selected),
-        "laws": [{"kind": list(shown.kind), "share": shown.share, "alike": [list(kind) for kind in shown.alike],
-                  "looks like": None if shown.form is None else shown.form._asdict()} for shown in found.discovered],
-        "errors": errors, "promised": [found.gap.before, found.gap.discovered, found.gap.floor],
-    }  # fmt: skip
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--kinds", nargs="+", default=list(KINDS), choices=[*KINDS, "nothing"])
-    parser.add_argument("--seeds", type=int, default=2)
-    parser.add_argument("--first", type=int, default=1)
-    parser.add_argument("--size", type=float, default=1.0)
-    parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--out", required=True, type=pathlib.Path)
-    options = parser.parse_args()
-    jobs = [(kind, seed, options.size) for seed in range(options.first, options.first + options.seeds) for kind in options.kinds]
-    rows = []
-    with multiprocessing.get_context("spawn").Pool(options.jobs) as pool:
-        for row in pool.imap_unordered(one, jobs):
-            rows.append(row)
-            print(json.dumps(row), flush=True)
-            options.out.write_text(json.dumps(rows, indent=1))
-
-
-if __name__ == "__main__":
-    main()
+    since = np.where(v * now.v < 0.0, 0.0, now.since + h)
+    heat = now.heat + h / HEAT_TIME * (push**2 - now.heat)
+    return Now(x, y, theta, v, w, push, now.angle + h * rolled, heat, since, now.time + h)
