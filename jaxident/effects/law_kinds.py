@@ -15,7 +15,7 @@ HEATS = {f"own heat {tau:g} s": tau for tau in HEAT_TIMES}
 """Signals that remember the wheel's own command, and the time constant [s] of each."""
 DISCOVERED = "discovered"
 """The key of laws among the settings of a program."""
-MOST_LAWS, MOST_KNOTS, MOST_SECOND = 3, 16, 8
+MOST_LAWS, MOST_KNOTS, MOST_SECOND = 3, 16, 9
 """Laws of one model, knots of a curve, and knots of a surface along each of its signals. Every set of curves runs
 through one compiled program, every set with a surface through another."""
 ACTS = {

@@ -2,14 +2,15 @@
 
 import dataclasses
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.effects.catalogue import CATALOGUE
-from jaxident.effects.law_kinds import value_name
+from jaxident.effects.law_kinds import MOST_KNOTS, MOST_SECOND, knots_by_signal, value_name
 from jaxident.robot.drive import Physical
-from jaxident.robot.model import Model, require_physical
+from jaxident.robot.model import Discovered, Model, require_physical
 
 STEP = 1e-4
 """Part of a parameter's size, or of its deviation if that is smaller, by which a robot is moved."""
@@ -17,14 +18,16 @@ MOST = 48
 """Robots at most, each of which costs a run of the filter. A surface alone has 64 values. Where more directions are
 independent, so many random mixtures of them are taken: a variance is then off by 16 % (141 directions; the square root
 of 2 / MOST times the part left out)."""
+FURTHER = 0.5
+"""Part of the range of a discovered law's knots over which it may go on beyond them. No other value was tried."""
 NO_SIZE = 1e-6
 """Below which a parameter says nothing of its size, in its own unit."""
 
 
 def directions(model: Model) -> list[tuple[Model, float]]:
     """Robots moved along the independent directions of the model's covariance, or along mixtures of these (`MOST`), and
-    by how many deviations each; none for a model without. What changes from the model to one of them, over that number,
-    is one deviation's worth."""
+    by how many deviations each; and robots whose laws go on beyond their knots. None for a model without a covariance.
+    What changes from the model to one of them, over that number, is one deviation's worth."""
     values = parameter_values(model)
     own = [k for k, name in enumerate(model.parameter_order) if name in values]
     if model.covariance is None or not own:
@@ -35,6 +38,29 @@ def directions(model: Model) -> list[tuple[Model, float]]:
     for direction in _roots(np.asarray(model.covariance, float)[np.ix_(own, own)]):
         size = STEP * min(1.0, float(np.min(np.abs(_sizes(names, here)) / np.maximum(np.abs(direction), 1e-300))))
         found.append((with_values(model, dict(zip(names, here + size * direction, strict=True))), size))
+    return found + [
+        (dataclasses.replace(model, discovered=(*model.discovered[:k], other, *model.discovered[k + 1 :])), STEP)
+        for k, law in enumerate(model.discovered)
+        for other in _continued(law)
+    ]
+
+
+def _continued(law: Discovered) -> list[Discovered]:
+    """A law that goes on beyond each end of its knots, as steep as it is inside (root mean square), STEP of that: what
+    it does there nobody has seen. From FURTHER of its range on it is constant again."""
+    value, found = np.asarray(law.value, float), []
+    most = MOST_SECOND if law.second_signal else MOST_KNOTS
+    for axis, at in enumerate(knots_by_signal(law).values()):
+        if len(at) == most:
+            continue  # no room for a knot more
+        along, far = np.moveaxis(value, axis, 0), FURTHER * np.ptp(at)
+        rise = STEP * far * np.sqrt(np.mean((np.diff(along, axis=0).T / np.diff(at)) ** 2))
+        for knots, moved in (
+            (np.append(at, at[-1] + far), np.append(along, along[-1:] + rise, axis=0)),
+            (np.insert(at, 0, at[0] - far), np.insert(along, 0, along[0] + rise, axis=0)),
+        ):
+            own: dict[str, Any] = {("at", "second_at")[axis]: knots, "value": np.moveaxis(moved, 0, axis)}
+            found.append(dataclasses.replace(law, **own, standard_deviation=None))
     return found
 
 

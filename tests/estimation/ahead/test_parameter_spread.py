@@ -37,7 +37,8 @@ def numbers(model: Model) -> np.ndarray:
 
 def test_directions_add_up_to_the_covariance():
     model = uncertain()
-    moved = np.array([(numbers(other) - numbers(model)) / size for other, size in directions(model)])
+    own = [(other, size) for other, size in directions(model) if len(other.discovered[0].at) == len(SPEEDS)]
+    moved = np.array([(numbers(other) - numbers(model)) / size for other, size in own])
     scale = np.sqrt(np.diagonal(model.covariance))
     np.testing.assert_allclose(moved.T @ moved / scale / scale[:, None], model.covariance / scale / scale[:, None],
                                atol=1e-6)  # fmt: skip
@@ -53,12 +54,38 @@ def test_many_directions_are_mixed_into_a_few_that_spread_as_much():
     model = dataclasses.replace(uncertain(), discovered=(surface,), effects=(), covariance=root @ root.T,
                                 parameter_order=order)  # fmt: skip
     here = np.ravel(surface.value)
-    moved = np.array([(np.ravel(other.discovered[0].value) - here) / size for other, size in directions(model)])
+    own = [(other.discovered[0], size) for other, size in directions(model) if other.discovered[0].value.size == 64]
+    moved = np.array([(np.ravel(law.value) - here) / size for law, size in own])
     assert len(moved) == MOST
     looks = rng.normal(size=(64, 200))
     ratio = np.sum((moved @ looks) ** 2, axis=0) / np.sum(looks * (model.covariance @ looks), axis=0)
     assert abs(ratio.mean() - 1.0) < 0.1
     assert ratio.std() < np.sqrt(2.0 / MOST)
+
+
+def test_a_law_may_go_on_beyond_its_knots_as_steep_as_it_is_inside():
+    """Robots that are moved so differ from the law's beyond the knots alone."""
+    model = dataclasses.replace(uncertain(), covariance=np.eye(1), parameter_order=("rate_1",))
+    beyond = [(other.discovered[0], size) for other, size in directions(model)[1:]]
+    assert len(beyond) == 2
+    steep = np.sqrt(np.mean(np.diff(LAW.value) ** 2)) / np.diff(SPEEDS)[0]
+    places = np.linspace(-1.5, 1.5, 31)
+    inside = np.abs(places) <= 0.5
+    moved = [np.interp(places, law.at, law.value) - np.interp(places, SPEEDS, LAW.value) for law, _ in beyond]
+    sizes = np.array([change / size for change, (_, size) in zip(moved, beyond, strict=True)])
+    np.testing.assert_array_equal(sizes[:, inside], 0.0)
+    expected = steep * np.clip(np.abs(places) - 0.5, 0.0, 0.5)
+    np.testing.assert_allclose(sizes.max(axis=0), expected, atol=1e-9)
+
+
+def test_a_surface_may_go_on_beyond_each_of_its_sides():
+    knots = np.linspace(-1.0, 1.0, 4)
+    surface = Discovered("acceleration along", "v", "x", knots, np.outer(knots, np.ones(4)), None, "y", knots)
+    model = dataclasses.replace(uncertain(), covariance=np.eye(1), parameter_order=("rate_1",), discovered=(surface,))
+    shapes = [other.discovered[0].value.shape for other, _ in directions(model)[1:]]
+    assert shapes == [(5, 4)] * 2 + [(4, 5)] * 2
+    rises = [np.ptp(other.discovered[0].value) - 2.0 for other, _ in directions(model)[1:]]
+    np.testing.assert_allclose(rises[:2], [1e-4, 0.0], atol=1e-9)  # a slope of 1 over half of 2 m; below it is less
 
 
 def test_values_that_are_set_are_there():
