@@ -79,7 +79,7 @@ def offered(finding, rng) -> dict[str, float]:
         signal = np.interp(now, *placebo(kind, rng, float(now.max())))
         at = np.linspace(*np.quantile(signal, INSIDE), KNOTS)
         parts = (part @ hats(signal, at) for part in (responses.along, responses.heading))
-        bent = [_beside(data, fit, base, prior, columns, precision((at,))) for columns in parts]
+        bent = [_beside(data, fit, base, prior, columns, precision((at,), np.zeros((KNOTS, 0)))) for columns in parts]
         price = np.log(len(KINDS) + 2 * len(PLACEBOS))
         worth[kind] = max(min(each.evidence - price, each.held_out) for each in bent)
     return worth

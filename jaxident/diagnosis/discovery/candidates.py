@@ -37,6 +37,8 @@ SITE_OF_SIGNAL = {
 """The site of a law that acts on accelerations or pushes, by its signal."""
 
 
+NOMINAL = ("v", "w", "push right", "push left", "own speed", "own push")
+"""Signals on which a force of the nominal robot depends, in a straight line."""
 FLOOR = ((ALONG, "1"), (ALONG, "v"), (HEADING, "1"), (HEADING, "w"), (SIDEWAYS, "v"), (TURN, "1"))
 """What may differ from place to place on the floor: slope, rolling, twist, turning, drift, and the camera's heading."""
 
@@ -114,6 +116,22 @@ def path_of(fit: Solution, windows: Windows, laws: Laws | None = None) -> Path:
     own |= dict(zip(HEATS, np.asarray(past.heat).transpose(1, 3, 0, 2), strict=True))
     seen = np.repeat(np.asarray(windows.seen).T, 3, axis=1)
     return Path(signals, own, gain, seen)
+
+
+def at_knots(at: tuple[Any, ...]) -> list[np.ndarray]:
+    """Each signal (knots,) at all knots of a law, row by row."""
+    return [signal.ravel() for signal in np.meshgrid(*at, indexing="ij")]
+
+
+def nominal_part(kind: Kind, at: tuple[Any, ...]) -> np.ndarray:
+    """Values (knots, n) of laws that the nominal robot has itself: rates, couplings and gains."""
+    signals = dict(zip(kind.names[2:], at_knots(at), strict=True))
+    count = int(np.prod([len(knots) for knots in at]))
+    if kind.acts_on not in (ALONG, HEADING, WHEELS):
+        return np.zeros((count, 0))
+    if kind.times != "1":
+        return np.ones((count, 1))
+    return np.stack([np.zeros(count), *(s for name, s in signals.items() if name in NOMINAL)], axis=1)[:, 1:]
 
 
 def candidates(path: Path, responses: Responses) -> Iterator[Candidate]:

@@ -17,6 +17,9 @@ from jaxident.array_types import Array
 FLAT = 1e-3
 """Precision of the values themselves over that of their second differences: straight lines are nearly free. No other
 value was tried."""
+HELD = 1e3
+"""Precision of what the nominal robot has as well, in the same unit. Were it free, a gain could grow while a curve
+falls: along that bent valley a refit did not arrive in ten steps (warm motors). No other value was tried."""
 SIZES = np.geomspace(1e-8, 1e8, 65)
 """Variances s^2 that are tried, in units of the mean variance of a knot's value without a prior."""
 FOLDS = 4
@@ -33,14 +36,15 @@ class Bent(NamedTuple):
     variance: float
 
 
-def precision(at: Sequence[Array]) -> np.ndarray:
+def precision(at: Sequence[Array], nominal: Array) -> np.ndarray:
     """Prior precision (n, n) of a law of unit size with some knots along each of its signals; n: all its knots, row by
-    row."""
+    row. nominal (n, m): combinations of values that the nominal robot has as well, and the law has not."""
     whole, order = np.zeros((1, 1)), 2 if len(at) == 1 else 1
     for knots in at:
         bend = np.diff(np.eye(len(knots)), order, axis=0)
         whole = np.kron(whole, np.eye(len(knots))) + np.kron(np.eye(len(whole)), bend.T @ bend)
-    return whole + FLAT * np.eye(len(whole))
+    basis, _ = np.linalg.qr(nominal)
+    return whole + FLAT * np.eye(len(whole)) + HELD * basis @ basis.T
 
 
 def bend(by_window: Array, prior: Array, smooth: Array) -> Bent:

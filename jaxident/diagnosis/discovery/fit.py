@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.discovery.candidates import Kind, columns_of, path_of
+from jaxident.diagnosis.discovery.candidates import Candidate, Kind, columns_of, nominal_part, path_of
 from jaxident.diagnosis.discovery.curves import precision, solved
 from jaxident.diagnosis.fit.prior import unlikeliness, with_prior
 from jaxident.diagnosis.fit.refit import Data, Solution, best_starts, covariance_from
@@ -82,13 +82,19 @@ def curve_columns(fit: Solution, data: Data, curves: tuple[Curve, ...]) -> np.nd
     return np.concatenate([columns_of(curve.kind, curve.at, path, responses) for curve in curves], axis=2)
 
 
+def prior_of(curve: Curve | Candidate) -> np.ndarray:
+    """Prior precision (knots, knots) of a law of unit size, which has nothing that the nominal robot has where the
+    robot was."""
+    return precision(curve.at, curve.density[:, None] * nominal_part(curve.kind, curve.at))
+
+
 def smoothness(curves: tuple[Curve, ...]) -> np.ndarray:
     """Prior precision (n, n) of the values of all curves, one after the other."""
     count = sum(len(curve.value) for curve in curves)
     whole, place = np.zeros((count, count)), 0
     for curve in curves:
         own = slice(place, place + len(curve.value))
-        whole[own, own] = precision(curve.at) / curve.variance
+        whole[own, own] = prior_of(curve) / curve.variance
         place += len(curve.value)
     return whole
 

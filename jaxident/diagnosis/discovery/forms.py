@@ -6,16 +6,14 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.effects.law_kinds import ALONG, HEADING, WHEELS
+from jaxident.diagnosis.discovery.candidates import Kind, at_knots, nominal_part
+from jaxident.effects.law_kinds import knots_by_signal
 from jaxident.robot.model import Discovered
 
 LIKE = 0.8
 """Part of a curve that a form has to explain before it is told. No other value was tried."""
 SIMPLER = 0.01
 """By which a form further down the list has to explain more. No other value was tried."""
-FORCES = (ALONG, HEADING, WHEELS)
-NOMINAL = ("v", "w", "push right", "push left", "own speed", "own push")
-"""Signals on which a force of the nominal robot depends, in a straight line."""
 BENDS = np.linspace(0.1, 0.9, 17)
 """Places of a bend or a step that are tried, as parts of the range of a signal."""
 
@@ -69,8 +67,8 @@ class Form(NamedTuple):
 def form_of(law: Discovered, density: Sequence[int]) -> Form | None:
     """The form that explains most of a law, the simplest one where two explain as much; None below LIKE.
 
-    density: rows that lie nearest to each knot, row by row for a surface. What the nominal robot has itself (`_own`) is
-    free: a rate may take up the straight line in a drag, and the form is that of the rest.
+    density: rows that lie nearest to each knot, row by row for a surface. What the nominal robot has itself
+    (`nominal_part`) is free: a rate may take up the straight line in a drag, and the form is that of the rest.
     """
     root = np.sqrt(np.maximum(np.asarray(density, float), 1e-9))
     own = root[:, None] * _own(law)
@@ -106,7 +104,7 @@ def _is_for(name: str, law: Discovered) -> bool:
 
 def _of_two(law: Discovered) -> Tried:
     """Forms of two signals: products, or on the floor a round patch."""
-    s, t = _knots(law)
+    s, t = at_knots(tuple(knots_by_signal(law).values()))
     if (law.signal, law.second_signal) != ("x", "y"):
         for name, shape in PRODUCTS.items():
             yield name, {}, shape(s, t)
@@ -121,12 +119,6 @@ def _of_two(law: Discovered) -> Tried:
                 yield PATCH, {"x0": float(x0), "y0": float(y0), "radius": float(radius)}, inside
 
 
-def _knots(law: Discovered) -> tuple[np.ndarray, np.ndarray]:
-    """Both signals (n,) at all knots of a surface, row by row."""
-    s, t = np.meshgrid(law.at, law.second_at, indexing="ij")
-    return s.ravel(), t.ravel()
-
-
 def beyond(law: Discovered, density: Sequence[int]) -> np.ndarray:
     """The values of a law less the part that the nominal robot could have as well, where the robot has been."""
     value, own, root = np.ravel(law.value), _own(law), np.sqrt(np.maximum(np.asarray(density, float), 1e-9))
@@ -136,13 +128,9 @@ def beyond(law: Discovered, density: Sequence[int]) -> np.ndarray:
 
 
 def _own(law: Discovered) -> np.ndarray:
-    """Columns (knots, n) that the nominal robot has itself: rates, couplings and gains."""
-    if law.times != "1" and law.acts_on in FORCES:
-        return np.ones((np.size(law.value), 1))
-    signals = _knots(law) if law.second_signal else (np.asarray(law.at),)
-    names = (law.signal, law.second_signal)
-    own = [s for s, name in zip(signals, names, strict=False) if law.times == "1" and name in NOMINAL]
-    return np.stack(own, axis=1) if own else np.zeros((np.size(law.value), 0))
+    """`nominal_part` of a law."""
+    kind = Kind(law.acts_on, law.times, law.signal, law.second_signal)
+    return nominal_part(kind, tuple(knots_by_signal(law).values()))
 
 
 def _explained(value: Array, basis: Array, free: Array) -> tuple[float, float]:

@@ -11,12 +11,13 @@ from jaxident.diagnosis.causes.finding import Finding
 from jaxident.diagnosis.causes.search_rounds import SURE
 from jaxident.diagnosis.causes.settled import LIKELY, whiten
 from jaxident.diagnosis.discovery.candidates import KINDS, candidates, path_of
-from jaxident.diagnosis.discovery.curves import Bent, bend, precision
+from jaxident.diagnosis.discovery.curves import Bent, bend
 from jaxident.diagnosis.discovery.fit import (
     Bending,
     Curve,
     curve_columns,
     laws_from,
+    prior_of,
     refit_with,
     smoothness,
 )
@@ -73,7 +74,7 @@ def strongest(data: Data, fit: Solution, curves: tuple[Curve, ...]) -> Curve | N
     for each in candidates(path_of(fit, data.windows, laws_from(curves)), responses):
         if any(each.kind == curve.kind for curve in curves):
             continue
-        bent = _beside(data, fit, base, prior, each.columns, precision(each.at))
+        bent = _beside(data, fit, base, prior, each.columns, prior_of(each))
         worth = min(bent.evidence - PRICE, bent.held_out)
         if worth > SURE:
             none = np.zeros(each.columns.shape[2])

@@ -8,9 +8,9 @@ import pytest
 
 import jaxident as ji
 from jaxident.diagnosis.causes.finding import find_effects
-from jaxident.diagnosis.discovery.candidates import KINDS, SECOND_KNOTS, Kind, Path, columns_of, hats
+from jaxident.diagnosis.discovery.candidates import KINDS, SECOND_KNOTS, Kind, Path, columns_of, hats, nominal_part
 from jaxident.diagnosis.discovery.curves import bend, precision, solved
-from jaxident.diagnosis.discovery.fit import Curve, as_law
+from jaxident.diagnosis.discovery.fit import Curve, as_law, prior_of
 from jaxident.diagnosis.discovery.forms import beyond, form_of
 from jaxident.diagnosis.discovery.search import discover
 from jaxident.diagnosis.motion.responses import Responses
@@ -44,7 +44,7 @@ def windows_of(curve, rng, windows=40, rows=30):
 
 def test_a_curve_in_the_data_is_found_and_its_values_are_near():
     by_window = windows_of(lambda s: 0.5 * np.sin(3.0 * s), np.random.default_rng(1))
-    found = bend(by_window, np.zeros(by_window.shape[1:]), precision((AT,)))
+    found = bend(by_window, np.zeros(by_window.shape[1:]), precision((AT,), np.zeros((KNOTS, 0))))
     assert found.evidence > 20.0
     assert found.held_out > 20.0
     values = solved(by_window.sum(axis=0), 1 + KNOTS)
@@ -55,7 +55,7 @@ def test_a_curve_in_the_data_is_found_and_its_values_are_near():
 def test_noise_alone_brings_no_curve():
     """Of 200 signals without any part in the data one in fifty may seem to be worth 2, none the 9 that are asked."""
     found = [
-        bend(by_window, np.zeros(by_window.shape[1:]), precision((AT,)))
+        bend(by_window, np.zeros(by_window.shape[1:]), precision((AT,), np.zeros((KNOTS, 0))))
         for by_window in (windows_of(np.zeros_like, np.random.default_rng(k), 12) for k in range(200))
     ]
     worth = np.array([min(one.evidence, one.held_out) for one in found])
@@ -136,7 +136,7 @@ def test_a_surface_answers_as_its_knots_say():
 
 def test_a_surface_that_is_flat_costs_next_to_nothing():
     """A prior on first differences along both signals: what is not known of a place is what its neighbours are."""
-    whole = precision((FLOOR, FLOOR))
+    whole = precision((FLOOR, FLOOR), np.zeros((S.size, 0)))
     flat, tilted = np.ones(S.size), np.ravel(S - S.min()) / np.ptp(S)
     assert flat @ whole @ flat < 0.1
     assert tilted @ whole @ tilted > flat @ whole @ flat
@@ -223,3 +223,25 @@ def test_a_round_carpet_is_found_as_a_surface():
 @pytest.mark.slow
 def test_robots_with_nothing_to_discover_have_no_curve():
     assert [len(searched(ROBOT, seed)) for seed in range(2, 8)] == [0] * 6
+
+
+def test_a_law_has_nothing_that_the_nominal_robot_has():
+    """Values of 1 at all knots, times v, are a rate: the prior holds their mean over the rows at 0."""
+    kind = Kind("acceleration along", "v", "w")
+    curve = curve_of(kind, AT)._replace(density=np.arange(KNOTS, dtype=float))
+    whole = prior_of(curve)
+    spread = np.linalg.inv(whole)
+    weight = curve.density / np.linalg.norm(curve.density)
+    assert weight @ spread @ weight < 2e-3
+    free = np.linalg.inv(precision((AT,), np.zeros((KNOTS, 0))))
+    bent = np.sin(3.0 * AT) - np.sum(curve.density * np.sin(3.0 * AT)) / curve.density.sum()
+    assert bent @ np.linalg.inv(spread) @ bent == pytest.approx(bent @ np.linalg.inv(free) @ bent, rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: " ".join(kind.names))
+def test_the_nominal_part_of_a_law_is_what_the_linear_robot_has(kind):
+    at = (FLOOR, FLOOR) if kind.second_signal else (AT,)
+    forces = kind.acts_on.startswith(("acceleration", "push"))
+    linear = sum(name in ("v", "w", "push right", "push left", "own speed", "own push") for name in kind.names[2:])
+    columns = (1 if kind.times != "1" else linear) if forces else 0
+    assert nominal_part(kind, at).shape == (int(np.prod([len(each) for each in at])), columns)
