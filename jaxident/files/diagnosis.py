@@ -41,7 +41,7 @@ def diagnosis_to_dict(found: Diagnosis) -> dict[str, Any]:
         "selected": list(found.selected),
         "refused": list(found.refused),
         "wheels": None if found.odometry is None else _wheels(found.odometry),
-        "discovered": [_law(one) for one in found.discovered] or None,
+        "discovered": [law_to_dict(one) for one in found.discovered] or None,
         "surplus": list(found.surplus),
         "parameters": [p._asdict() for p in found.parameters],
         "not_testable": found.not_testable,
@@ -68,7 +68,7 @@ def _in_thousandths(errors: dict[str, tuple[float, float]]) -> dict[str, dict[st
     return {name: {"position": 1e3 * own[0], "heading": 1e3 * own[1]} for name, own in errors.items()}
 
 
-def _law(shown: Shown) -> dict[str, Any]:
+def law_to_dict(shown: Shown) -> dict[str, Any]:
     """One discovered law."""
     law, form = shown.law, shown.form
     places = itertools.product(*(knots.tolist() for knots in knots_by_signal(law).values()))

@@ -1,0 +1,62 @@
+"""The robots with hidden effects: without one they are the package's robot, with one they are not."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import jaxident as ji
+from experiments.unlisted.measure import achieved, as_logs, table, true_model
+from experiments.unlisted.page import law_of, write
+from experiments.unlisted.robots import KINDS, draw_robot, drive
+from jaxident.diagnosis.account.discovered import Shown
+from jaxident.diagnosis.discovery.candidates import Kind
+from jaxident.files.diagnosis import law_to_dict
+from jaxident.robot.model import Discovered
+
+KNOTS = np.linspace(-1.0, 1.0, 4)
+SURFACE = Discovered("acceleration along", "v", "x", KNOTS, np.arange(16.0).reshape(4, 4), np.ones((4, 4)), "y", KNOTS)
+CURVE = Discovered("acceleration along", "1", "v", KNOTS, KNOTS**2, np.ones(4))
+
+
+def errors(kind: str, size: float = 1.0) -> float:
+    """Root mean square distance [m] of runs with camera noise from the package's robot without noise."""
+    robot = draw_robot(np.random.default_rng(3))
+    model = dataclasses.replace(true_model(robot), noise=None)
+    apart = []
+    for whole in as_logs(drive(robot, kind, size, 2, 5)):
+        log = whole.rows(0, 121)
+        start = ji.State(log.x[0], log.y[0], log.theta[0], 0.0, 0.0)
+        made = ji.simulate(model, log, start=start)
+        apart.append(np.hypot(np.asarray(made.x) - log.x, np.asarray(made.y) - log.y))
+    return float(np.sqrt(np.mean(np.square(apart))))
+
+
+def test_a_robot_without_an_effect_is_the_packages():
+    assert errors("nothing") < 0.012  # the heading's noise at the start, over 3 s, and slip
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in ("nothing", "bumps", "cogs", "oval")])
+def test_an_effect_moves_the_robot(kind):
+    assert errors(kind, 3.0) > 1.5 * errors("nothing")
+
+
+def test_a_law_reads_back_from_what_a_diagnosis_tells():
+    for law in (SURFACE, CURVE):
+        kind = Kind(law.acts_on, law.times, law.signal, law.second_signal)
+        back = law_of(law_to_dict(Shown(kind, law, tuple([1] * law.value.size), 0.1, 0.01, None)))
+        assert (back.signal, back.second_signal, back.times) == (law.signal, law.second_signal, law.times)
+        np.testing.assert_array_equal(back.value, law.value)
+        np.testing.assert_array_equal(back.at, law.at)
+
+
+def test_table_and_page_tell_of_every_robot(tmp_path):
+    law = law_to_dict(Shown(Kind("acceleration along", "v", "x", "y"), SURFACE, tuple(range(16)), 0.1, 0.01, None))
+    row = {"kind": "patch", "seed": 1, "size": 1.0, "seconds": 9.0, "verdict": "partly", "named": [], "laws": [law],
+           "nominal": 103.0, "corrected": 28.0, "known": 3.0}  # fmt: skip
+    assert achieved(row) == pytest.approx(0.75)
+    assert "| patch | 1 |" in table([row])
+    write([row, row | {"kind": "nothing", "laws": [], "nominal": 3.1}], tmp_path / "page.html")
+    page = (tmp_path / "page.html").read_text()
+    assert "75 %" in page
+    assert "nothing to take" in page
