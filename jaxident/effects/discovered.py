@@ -4,9 +4,10 @@ of the chain.
     what it adds = times * curve(signal), or times * surface(signal, second signal)
 
 A curve is straight between its knots and constant beyond them; so is a surface along each of its signals. times is 1,
-the speed v or the turn rate w: a robot that loses speed in turns has v times a curve of w, and one that is slow on a
-patch of carpet has v times a surface of x and y. Both integrators take laws from their settings (`with_laws`), under
-one name that no effect of the catalogue has.
+the speed v, the turn rate w, a wheel's push, or the cosine or sine of the heading. A robot that loses speed in turns
+has v times a curve of w; one that is slow on a patch of carpet has v times a surface of x and y; a floor that slopes
+differently from place to place makes two surfaces, one for each direction. Both integrators take laws from their
+settings (`with_laws`), under one name that no effect of the catalogue has.
 """
 
 from collections.abc import Mapping, Sequence
@@ -173,8 +174,10 @@ def _piecewise(at: Array, value: Array, signal: Array) -> Array:
 
 
 def _factor(laws: Laws, now: Motion) -> Array:
-    """1, v or w of every law (laws, ...); 1 for those of a wheel's own push."""
-    return jnp.stack([jnp.ones_like(now.v), now.v, now.w, jnp.ones_like(now.v)])[laws.times]
+    """What the curve of every law is multiplied with (laws, ...); 1 for those of a wheel's own push."""
+    sine, cosine = sin_cos(now.theta)
+    one = jnp.ones_like(now.v)
+    return jnp.stack([one, now.v, now.w, one, cosine, sine])[laws.times]
 
 
 def _each(values: Array, like: Array) -> Array:

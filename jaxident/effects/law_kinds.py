@@ -34,7 +34,7 @@ its sign (`past`). own: of the wheel that is pushed; its speed is in the command
 squared command over some seconds."""
 OF_CAMERA = ("heading", "x", "y")
 """Signals that a camera's error may depend on."""
-TIMES = {"1": "", "v": "m/s", "w": "rad/s", "own push": UNIT}
+TIMES = {"1": "", "v": "m/s", "w": "rad/s", "own push": UNIT, "cos heading": "", "sin heading": ""}
 """What a curve may be multiplied with, and the unit."""
 
 
@@ -82,7 +82,7 @@ def _check_kind(law: Discovered) -> None:
         raise InputError(f"discovered: an error of the camera is 1 times a curve of {' or '.join(OF_CAMERA)}")
     if not own == (law.acts_on == WHEELS) == (own and not law.second_signal):
         raise InputError("discovered: a push of each wheel is a curve of the wheel's own speed, push or heat")
-    if law.times not in (("1", "own push") if own else ("1", "v", "w")):
+    if law.times not in (("1", "own push") if own else (name for name in TIMES if name != "own push")):
         raise InputError(f"discovered: {law.times} times a curve of {law.signal}: no program multiplies these")
     if law.signal == law.second_signal:
         raise InputError(f"discovered: a surface of {law.signal} and {law.signal}; two signals are needed")

@@ -18,7 +18,10 @@ SIGNAL_WORDS = {
     "own speed": "speed of that wheel", "own push": "push of that wheel", "since reversal": "time since a reversal",
     **{name: f"mean square of that wheel's command over {tau:g} s" for name, tau in HEATS.items()},
 }  # fmt: skip
-TIMES_WORDS = {"1": "", "v": "speed times ", "w": "turn rate times ", "own push": "push of that wheel times "}
+TIMES_WORDS = {
+    "1": "", "v": "speed times ", "w": "turn rate times ", "own push": "push of that wheel times ",
+    "cos heading": "the heading's cosine times ", "sin heading": "the heading's sine times ",
+}  # fmt: skip
 SEEN = (
     "These laws are in no catalogue. They were found on the runs that fit, and runs that took no part in that confirm "
     "them. Each adds a curve of one signal, or a surface of two, at one place. The corrected model has them, and "

@@ -51,6 +51,7 @@ LAWS = (
     ("push of each wheel", "own push", "own heat 3 s", HEATS, -0.5 * HEATS),
     ("acceleration along", "v", "since reversal", SINCE, -3.0 * np.exp(-SINCE / 0.4)),
     ("acceleration along", "v", "x", PUSHES[::2], SURFACE, None, "y", PUSHES[::2]),
+    ("acceleration along", "sin heading", "x", PUSHES[::2], SURFACE, None, "y", PUSHES[::2]),
     ("speed sideways", "v", "x", PUSHES[::2], 0.1 * SURFACE, None, "y", PUSHES[::2]),
 )
 

@@ -39,8 +39,10 @@ SITE_OF_SIGNAL = {
 
 NOMINAL = ("v", "w", "push right", "push left", "own speed", "own push")
 """Signals on which a force of the nominal robot depends, in a straight line."""
-FLOOR = ((ALONG, "1"), (ALONG, "v"), (HEADING, "1"), (HEADING, "w"), (SIDEWAYS, "v"), (TURN, "1"))
-"""What may differ from place to place on the floor: slope, rolling, twist, turning, drift, and the camera's heading."""
+FLOOR = ((ALONG, "1"), (ALONG, "v"), (ALONG, "cos heading"), (ALONG, "sin heading"), (HEADING, "1"), (HEADING, "w"),
+         (SIDEWAYS, "v"), (TURN, "1"))  # fmt: skip
+"""What may differ from place to place on the floor: a pull, rolling, the slope along x and along y, twist, turning,
+drift, and the camera's heading."""
 
 
 class Kind(NamedTuple):
@@ -111,7 +113,8 @@ def path_of(fit: Solution, windows: Windows, laws: Laws | None = None) -> Path:
     heading = (theta + np.pi) % (2.0 * np.pi) - np.pi
     signals = {"1": np.ones_like(v), "v": v, "w": w, "heading": heading, "x": x, "y": y, "time": time,
                "push right": push[..., 0], "push left": push[..., 1],
-               "since reversal": np.asarray(past.since).T}  # fmt: skip
+               "since reversal": np.asarray(past.since).T, "cos heading": np.cos(theta),
+               "sin heading": np.sin(theta)}  # fmt: skip
     own = {"1": np.ones_like(push), "own speed": speeds, "own push": push}
     own |= dict(zip(HEATS, np.asarray(past.heat).transpose(1, 3, 0, 2), strict=True))
     seen = np.repeat(np.asarray(windows.seen).T, 3, axis=1)
@@ -130,7 +133,7 @@ def nominal_part(kind: Kind, at: tuple[Any, ...]) -> np.ndarray:
     if kind.acts_on not in (ALONG, HEADING, WHEELS):
         return np.zeros((count, 0))
     if kind.times != "1":
-        return np.ones((count, 1))
+        return np.ones((count, int(kind.times in ("v", "w", "own push"))))
     return np.stack([np.zeros(count), *(s for name, s in signals.items() if name in NOMINAL)], axis=1)[:, 1:]
 
 
