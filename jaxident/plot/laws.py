@@ -51,7 +51,7 @@ def _map(law: Discovered, counts: Array | None, label: str, ax: Axes) -> None:
     fine, second_fine = (np.interp(np.arange(0, len(k) - 1 + 0.5 / FINE, 1 / FINE), np.arange(len(k)), k)
                          for k in (at, second_at))  # fmt: skip
     along = np.stack([np.interp(fine, at, column) for column in value.T], axis=1)
-    whole = np.stack([np.interp(second_fine, second_at, row) for row in along], axis=1)
+    whole = np.stack([np.interp(second_fine, second_at, row) for row in along])
     most = float(np.abs(value).max()) or 1.0
     shown = ax.pcolormesh(fine, second_fine, whole.T, cmap=SIGNED, vmin=-most, vmax=most, shading="gouraud")
     places = np.meshgrid(at, second_at, indexing="ij")

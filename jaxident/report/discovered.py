@@ -2,11 +2,13 @@
 
 import dataclasses
 
+from matplotlib.patches import Circle
+
 from jaxident import plot
 from jaxident.diagnosis.account.discovered import Shown
 from jaxident.diagnosis.diagnose import Diagnosis
 from jaxident.diagnosis.discovery.candidates import Kind
-from jaxident.diagnosis.discovery.forms import beyond
+from jaxident.diagnosis.discovery.forms import PATCH, beyond
 from jaxident.effects.catalogue import BY_KIND
 from jaxident.effects.law_kinds import HEATS, SIGNALS, value_unit
 from jaxident.report.page import Figure, Section, Table
@@ -31,7 +33,7 @@ SEEN = (
 OF_CURVE = "Line: the curve; shade: two standard deviations; grey bars: how often the robot was there. "
 OF_MAP = (
     "Colour: the surface; dots: its knots, larger where the robot was more often, hollow where the value is less than "
-    "two standard deviations from 0. "
+    "two standard deviations from 0; dashed: the circle that it looks like, if any. "
 )
 REST = "What the nominal model could have as well (in its rates and gains) is taken away; its doubt is not."
 HEIGHT, MAP_HEIGHT = 2.1, 4.2
@@ -77,6 +79,9 @@ def _picture(shown: Shown) -> Figure:
     told = dataclasses.replace(law, value=beyond(law, shown.density))
     plot.discovered(told, shown.density, ax=ax, xlabel=f"{SIGNAL_WORDS[law.signal]} [{SIGNALS[law.signal]}]",
                     ylabel=f"{law.acts_on}\n[{value_unit(law)}]")  # fmt: skip
+    if shown.form is not None and shown.form.form == PATCH:
+        at = shown.form.parameters
+        ax.add_patch(Circle((at["x0"], at["y0"]), at["radius"], fill=False, linestyle="--"))
     caption = (OF_MAP if surface else OF_CURVE) + REST
     return Figure(plot.image(figure), _place(shown.kind), caption)
 
@@ -109,7 +114,9 @@ def _place(kind: Kind) -> str:
 
 def _words(kind: Kind) -> str:
     shape = f"a curve of the {SIGNAL_WORDS[kind.signal]}"
-    if kind.second_signal:
+    if (kind.signal, kind.second_signal) == ("x", "y"):
+        shape = "a map of the floor"
+    elif kind.second_signal:
         shape = f"a surface of the {SIGNAL_WORDS[kind.signal]} and the {SIGNAL_WORDS[kind.second_signal]}"
     return f"{TIMES_WORDS[kind.times]}{shape}"
 

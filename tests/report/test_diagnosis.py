@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from support.diagnoses import LARGEST, VERDICTS, discovered_law, finding_of, made_up
 
+from jaxident.diagnosis.account.discovered import Shown
 from jaxident.diagnosis.account.odometry import Odometry
 from jaxident.diagnosis.decide import Parameter
 from jaxident.diagnosis.diagnose import COASTED
 from jaxident.diagnosis.discovery.candidates import Kind
+from jaxident.diagnosis.discovery.forms import PATCH, Form
 from jaxident.diagnosis.smallest_effects import smallest_sizes
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.coordinates import COORDINATES
@@ -22,6 +24,7 @@ from jaxident.report.lead import lead
 from jaxident.report.motor_or_ground import wheels_line
 from jaxident.report.stretches import SHOWN, draw_stretches, worst_starts, worst_stretches
 from jaxident.report.words import EFFECTS, LOOKS, SITES, chance, measured, number, parameters, percent, plain, together
+from jaxident.robot.model import Discovered
 from jaxident.robot.wheel_sensor import WheelSensor
 
 LEADS = {
@@ -246,6 +249,18 @@ def test_discovered_laws_have_a_section_a_picture_and_a_sentence():
     assert any(isinstance(block, Figure) and block.png for block in blocks)
     assert "with discovered laws" in str(section(page, "How large the gap is").blocks)
     assert blocks[-1].endswith("this may be turn loss in another form than the catalogue's.")
+
+
+def test_a_map_of_the_floor_is_told_and_drawn():
+    floor = np.linspace(-1.0, 1.0, 4)
+    law = Discovered("acceleration along", "v", "x", floor, np.eye(4), np.ones((4, 4)), "y", floor)
+    form = Form(PATCH, {"c": -3.0, "x0": 0.2, "y0": -0.1, "radius": 0.35}, 0.94)
+    shown = Shown(Kind("acceleration along", "v", "x", "y"), law, (1,) * 16, 0.2, 0.01, form)
+    page = diagnosis_page(made_up("partly")._replace(discovered=(shown,)), "runs")
+    assert "speed times a map of the floor (94\N{NO-BREAK SPACE}% of it is c within a circle with c = " in page.lead
+    (picture,) = [block for block in section(page, "What was discovered").blocks if isinstance(block, Figure)]
+    assert picture.png
+    assert "dashed" in picture.caption
 
 
 def test_laws_that_explain_nearly_as_much_are_named():
