@@ -7,8 +7,8 @@ from matplotlib.patches import Circle
 from jaxident import plot
 from jaxident.diagnosis.account.discovered import Shown
 from jaxident.diagnosis.diagnose import Diagnosis
-from jaxident.diagnosis.discovery.candidates import Kind
 from jaxident.diagnosis.discovery.forms import PATCH, beyond
+from jaxident.diagnosis.discovery.kinds import Kind
 from jaxident.effects.catalogue import BY_KIND
 from jaxident.effects.law_kinds import HEATS, SIGNALS, value_unit
 from jaxident.report.page import Figure, Section, Table

@@ -8,7 +8,7 @@ import pytest
 
 import jaxident as ji
 from jaxident.array_types import AT_REST, Pose
-from jaxident.diagnosis.discovery.candidates import KINDS
+from jaxident.diagnosis.discovery.kinds import KINDS
 from jaxident.effects.catalogue import BY_KIND
 from jaxident.effects.discovered import laws_of, shifted, with_laws
 from jaxident.effects.law_kinds import ACTS, MOST_KNOTS, MOST_LAWS, MOST_SECOND, check_discovered

@@ -10,7 +10,7 @@ from experiments.unlisted.measure import achieved, as_logs, table, true_model
 from experiments.unlisted.page import law_of, write
 from experiments.unlisted.robots import KINDS, draw_robot, drive
 from jaxident.diagnosis.account.discovered import Shown
-from jaxident.diagnosis.discovery.candidates import Kind
+from jaxident.diagnosis.discovery.kinds import Kind
 from jaxident.files.diagnosis import law_to_dict
 from jaxident.robot.model import Discovered
 

@@ -10,8 +10,8 @@ from jaxident.diagnosis.account.discovered import Shown
 from jaxident.diagnosis.account.odometry import Odometry
 from jaxident.diagnosis.decide import Parameter
 from jaxident.diagnosis.diagnose import COASTED
-from jaxident.diagnosis.discovery.candidates import Kind
 from jaxident.diagnosis.discovery.forms import PATCH, Form
+from jaxident.diagnosis.discovery.kinds import Kind
 from jaxident.diagnosis.smallest_effects import smallest_sizes
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.coordinates import COORDINATES

@@ -17,8 +17,8 @@ from jaxident.diagnosis.causes.finding import Finding, Values
 from jaxident.diagnosis.decide import Parameter
 from jaxident.diagnosis.detectability import Replay
 from jaxident.diagnosis.diagnose import Diagnosis
-from jaxident.diagnosis.discovery.candidates import Kind
 from jaxident.diagnosis.discovery.forms import Form
+from jaxident.diagnosis.discovery.kinds import Kind
 from jaxident.diagnosis.fit.refit import Solution
 from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.posterior import Cause, Judgement

@@ -9,9 +9,9 @@ from jaxident.diagnosis.account.models import Corrected, corrected_of
 from jaxident.diagnosis.account.shrink import LOW, taken
 from jaxident.diagnosis.account.sized import beside, sized_corrected
 from jaxident.diagnosis.causes.finding import Finding
-from jaxident.diagnosis.discovery.candidates import Kind
 from jaxident.diagnosis.discovery.fit import Bending, as_law
 from jaxident.diagnosis.discovery.forms import Form, form_of
+from jaxident.diagnosis.discovery.kinds import Kind
 from jaxident.diagnosis.discovery.search import discover
 from jaxident.diagnosis.noise.law import deviations
 from jaxident.diagnosis.noise.variance_uncertainty import Draws

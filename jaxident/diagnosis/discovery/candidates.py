@@ -1,4 +1,4 @@
-"""Laws that could be discovered: where they act, what they depend on, and how the poses answer to each piece of curve.
+"""Laws that could be discovered in some logs, and how the poses answer to each piece of their curves.
 
 A curve is a sum of hats, one at each knot; a surface one of products of hats, row by row. Columns are answers of the
 poses to these, linear about a fitted path.
@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
+from jaxident.diagnosis.discovery.kinds import KINDS, Kind
 from jaxident.diagnosis.fit.refit import Solution
 from jaxident.diagnosis.motion.linear import motion_of
 from jaxident.diagnosis.motion.paths import left_behind
@@ -21,69 +22,17 @@ from jaxident.effects.law_kinds import AHEAD, ALONG, BY_CAMERA, HEADING, HEATS, 
 KNOTS = 10
 """Of a curve. No other number was tried."""
 SECOND_KNOTS = 8
-"""Of a surface along each of its signals. No other number was tried."""
+"""Of a surface along each of its signals, one less than a program has room for (`ahead.parameter_spread`). No other
+number was tried."""
 INSIDE = (0.01, 0.99)
 """Quantiles of a signal between which its knots lie. No others were tried."""
 VARIED = 1e-6
 """A signal that spans less than this, in its own unit, tells no curve. No other value was tried."""
-OF_FORCE = ("v", "w", "heading", "x", "y", "time", "push right", "push left", "since reversal")
-ELSEWHERE = ("heading", "x", "y", "time", "since reversal")
-"""Of what is no speed."""
-SITE_OF_SIGNAL = {
-    "v": "drive", "w": "drive", "heading": "contact", "x": "contact", "y": "contact", "time": "time",
-    "push right": "actuation", "push left": "actuation", "since reversal": "contact", "own speed": "drive",
-    "own push": "actuation", **dict.fromkeys(HEATS, "actuation"),
-}  # fmt: skip
-"""The site of a law that acts on accelerations or pushes, by its signal."""
-
-
-NOMINAL = ("v", "w", "push right", "push left", "own speed", "own push")
-"""Signals on which a force of the nominal robot depends, in a straight line."""
-FLOOR = ((ALONG, "1"), (ALONG, "v"), (ALONG, "cos heading"), (ALONG, "sin heading"), (HEADING, "1"), (HEADING, "w"),
-         (SIDEWAYS, "v"), (TURN, "1"))  # fmt: skip
-"""What may differ from place to place on the floor: a pull, rolling, the slope along x and along y, twist, turning,
-drift, and the camera's heading."""
-
-
-class Kind(NamedTuple):
-    """Where a law acts, what its curve or surface is multiplied with, and what this depends on."""
-
-    acts_on: str
-    times: str
-    signal: str
-    second_signal: str = ""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """As an effect's record says in whose place it acts (`EffectRecord.kinds`)."""
-        return tuple(filter(None, self))
-
-    @property
-    def site(self) -> str:
-        """The site of the catalogue that such a law belongs to."""
-        if self.acts_on in BY_CAMERA:
-            return "camera"
-        return "contact" if self.acts_on == SIDEWAYS else SITE_OF_SIGNAL[self.signal]
-
-
-KINDS = (
-    *(Kind(act, "1", signal) for act in (ALONG, HEADING) for signal in OF_FORCE),
-    *(Kind(act, "v", signal) for act in (ALONG, HEADING) for signal in ("w", *ELSEWHERE)),
-    *(Kind(act, "w", signal) for act in (ALONG, HEADING) for signal in ("v", *ELSEWHERE)),
-    *(Kind(SIDEWAYS, "v", signal) for signal in ("w", "heading", "x", "y", "time")),
-    *(Kind(SIDEWAYS, "1", signal) for signal in ("w", "heading")),
-    *(Kind(WHEELS, "1", signal) for signal in ("own speed", "own push")),
-    *(Kind(WHEELS, "own push", signal) for signal in HEATS),
-    *(Kind(act, "1", signal) for act in (AHEAD, LEFT, TURN) for signal in ("heading", "x", "y")),
-    *(Kind(act, times, "x", "y") for act, times in FLOOR),
-    *(Kind(act, "1", *pair) for act in (ALONG, HEADING) for pair in (("v", "w"), ("push right", "push left"))),
-)
-"""All that are tried. What stands as a product in two of them (v times a curve of w, w times one of v) stands twice."""
 
 
 class Path(NamedTuple):
     """Signals (windows, rows) along the path of a fit, and by wheel those of its own (windows, rows, 2); gain (2, 2) of
-    the nominal drive; heading (windows, rows); seen (windows, numbers)."""
+    the nominal drive; seen (windows, numbers)."""
 
     signals: dict[str, Any]
     own: dict[str, Any]
@@ -119,22 +68,6 @@ def path_of(fit: Solution, windows: Windows, laws: Laws | None = None) -> Path:
     own |= dict(zip(HEATS, np.asarray(past.heat).transpose(1, 3, 0, 2), strict=True))
     seen = np.repeat(np.asarray(windows.seen).T, 3, axis=1)
     return Path(signals, own, gain, seen)
-
-
-def at_knots(at: tuple[Any, ...]) -> list[np.ndarray]:
-    """Each signal (knots,) at all knots of a law, row by row."""
-    return [signal.ravel() for signal in np.meshgrid(*at, indexing="ij")]
-
-
-def nominal_part(kind: Kind, at: tuple[Any, ...]) -> np.ndarray:
-    """Values (knots, n) of laws that the nominal robot has itself: rates, couplings and gains."""
-    signals = dict(zip(kind.names[2:], at_knots(at), strict=True))
-    count = int(np.prod([len(knots) for knots in at]))
-    if kind.acts_on not in (ALONG, HEADING, WHEELS):
-        return np.zeros((count, 0))
-    if kind.times != "1":
-        return np.ones((count, int(kind.times in ("v", "w", "own push"))))
-    return np.stack([np.zeros(count), *(s for name, s in signals.items() if name in NOMINAL)], axis=1)[:, 1:]
 
 
 def candidates(path: Path, responses: Responses) -> Iterator[Candidate]:

@@ -5,8 +5,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.discovery.candidates import Candidate, Kind, columns_of, nominal_part, path_of
+from jaxident.diagnosis.discovery.candidates import Candidate, columns_of, path_of
 from jaxident.diagnosis.discovery.curves import precision, solved
+from jaxident.diagnosis.discovery.kinds import Kind, nominal_part
 from jaxident.diagnosis.fit.prior import unlikeliness, with_prior
 from jaxident.diagnosis.fit.refit import Data, Solution, best_starts, covariance_from
 from jaxident.diagnosis.motion.linear import Gram, Linear, gram, linearise

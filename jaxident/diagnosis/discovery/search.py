@@ -10,7 +10,7 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.causes.finding import Finding
 from jaxident.diagnosis.causes.search_rounds import SURE
 from jaxident.diagnosis.causes.settled import LIKELY, whiten
-from jaxident.diagnosis.discovery.candidates import KINDS, candidates, path_of
+from jaxident.diagnosis.discovery.candidates import candidates, path_of
 from jaxident.diagnosis.discovery.curves import Bent, bend
 from jaxident.diagnosis.discovery.fit import (
     Bending,
@@ -21,6 +21,7 @@ from jaxident.diagnosis.discovery.fit import (
     refit_with,
     smoothness,
 )
+from jaxident.diagnosis.discovery.kinds import KINDS
 from jaxident.diagnosis.fit.prior import with_prior
 from jaxident.diagnosis.fit.refit import Data, Solution
 from jaxident.diagnosis.motion.linear import without_starts

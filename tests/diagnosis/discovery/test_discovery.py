@@ -8,10 +8,11 @@ import pytest
 
 import jaxident as ji
 from jaxident.diagnosis.causes.finding import find_effects
-from jaxident.diagnosis.discovery.candidates import KINDS, SECOND_KNOTS, Kind, Path, columns_of, hats, nominal_part
+from jaxident.diagnosis.discovery.candidates import SECOND_KNOTS, Path, columns_of, hats
 from jaxident.diagnosis.discovery.curves import bend, precision, solved
 from jaxident.diagnosis.discovery.fit import Curve, as_law, prior_of
 from jaxident.diagnosis.discovery.forms import beyond, form_of
+from jaxident.diagnosis.discovery.kinds import KINDS, Kind, nominal_part
 from jaxident.diagnosis.discovery.search import discover
 from jaxident.diagnosis.motion.responses import Responses
 from jaxident.diagnosis.preparation.prepare import prepare

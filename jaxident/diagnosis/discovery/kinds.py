@@ -1,0 +1,75 @@
+"""Kinds of laws that are looked for: where each acts, what it depends on, and what of it the nominal robot has itself."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from jaxident.effects.law_kinds import AHEAD, ALONG, BY_CAMERA, HEADING, HEATS, LEFT, SIDEWAYS, TURN, WHEELS
+
+OF_FORCE = ("v", "w", "heading", "x", "y", "time", "push right", "push left", "since reversal")
+ELSEWHERE = ("heading", "x", "y", "time", "since reversal")
+"""Of what is no speed."""
+SITE_OF_SIGNAL = {
+    "v": "drive", "w": "drive", "heading": "contact", "x": "contact", "y": "contact", "time": "time",
+    "push right": "actuation", "push left": "actuation", "since reversal": "contact", "own speed": "drive",
+    "own push": "actuation", **dict.fromkeys(HEATS, "actuation"),
+}  # fmt: skip
+"""The site of a law that acts on accelerations or pushes, by its signal."""
+NOMINAL = ("v", "w", "push right", "push left", "own speed", "own push")
+"""Signals on which a force of the nominal robot depends, in a straight line."""
+FLOOR = ((ALONG, "1"), (ALONG, "v"), (ALONG, "cos heading"), (ALONG, "sin heading"), (HEADING, "1"), (HEADING, "w"),
+         (SIDEWAYS, "v"), (TURN, "1"))  # fmt: skip
+"""What may differ from place to place on the floor: a pull, rolling, the slope along x and along y, twist, turning,
+drift, and the camera's heading."""
+
+
+class Kind(NamedTuple):
+    """Where a law acts, what its curve or surface is multiplied with, and what this depends on."""
+
+    acts_on: str
+    times: str
+    signal: str
+    second_signal: str = ""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """As an effect's record says in whose place it acts (`EffectRecord.kinds`)."""
+        return tuple(filter(None, self))
+
+    @property
+    def site(self) -> str:
+        """The site of the catalogue that such a law belongs to."""
+        if self.acts_on in BY_CAMERA:
+            return "camera"
+        return "contact" if self.acts_on == SIDEWAYS else SITE_OF_SIGNAL[self.signal]
+
+
+KINDS = (
+    *(Kind(act, "1", signal) for act in (ALONG, HEADING) for signal in OF_FORCE),
+    *(Kind(act, "v", signal) for act in (ALONG, HEADING) for signal in ("w", *ELSEWHERE)),
+    *(Kind(act, "w", signal) for act in (ALONG, HEADING) for signal in ("v", *ELSEWHERE)),
+    *(Kind(SIDEWAYS, "v", signal) for signal in ("w", "heading", "x", "y", "time")),
+    *(Kind(SIDEWAYS, "1", signal) for signal in ("w", "heading")),
+    *(Kind(WHEELS, "1", signal) for signal in ("own speed", "own push")),
+    *(Kind(WHEELS, "own push", signal) for signal in HEATS),
+    *(Kind(act, "1", signal) for act in (AHEAD, LEFT, TURN) for signal in ("heading", "x", "y")),
+    *(Kind(act, times, "x", "y") for act, times in FLOOR),
+    *(Kind(act, "1", *pair) for act in (ALONG, HEADING) for pair in (("v", "w"), ("push right", "push left"))),
+)
+"""All that are tried. What stands as a product in two of them (v times a curve of w, w times one of v) stands twice."""
+
+
+def at_knots(at: tuple[Any, ...]) -> list[np.ndarray]:
+    """Each signal (knots,) at all knots of a law, row by row."""
+    return [signal.ravel() for signal in np.meshgrid(*at, indexing="ij")]
+
+
+def nominal_part(kind: Kind, at: tuple[Any, ...]) -> np.ndarray:
+    """Values (knots, n) of laws that the nominal robot has itself: rates, couplings and gains."""
+    signals = dict(zip(kind.names[2:], at_knots(at), strict=True))
+    count = int(np.prod([len(knots) for knots in at]))
+    if kind.acts_on not in (ALONG, HEADING, WHEELS):
+        return np.zeros((count, 0))
+    if kind.times != "1":
+        return np.ones((count, int(kind.times in ("v", "w", "own push"))))
+    return np.stack([np.zeros(count), *(s for name, s in signals.items() if name in NOMINAL)], axis=1)[:, 1:]
