@@ -1,1 +1,1 @@
-"""What is predictable and in no catalogue: curves of one signal that windows agree on and judging runs confirm."""
+"""What is predictable and in no catalogue: curves and surfaces that windows agree on and judging runs confirm."""

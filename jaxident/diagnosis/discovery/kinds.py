@@ -1,4 +1,4 @@
-"""Kinds of laws that are looked for: where each acts, what it depends on, and what of it the nominal robot has itself."""
+"""Kinds of laws that are looked for: where each acts, what it depends on, what of it the nominal robot has as well."""
 
 from typing import Any, NamedTuple
 
