@@ -52,6 +52,8 @@ PRODUCTS: Forms = {
     "c |s t|": lambda s, t: np.abs(s * t),
 }
 """Forms of two signals s and t."""
+SLOPES: Forms = {"c s": lambda s, _: s, "c t": lambda _, t: t}
+"""Forms of a place on the floor, beside PATCH."""
 PATCH = "c within a circle"
 """Around a place on the floor: centre and radius [m]."""
 
@@ -103,11 +105,12 @@ def _is_for(name: str, law: Discovered) -> bool:
 
 
 def _of_two(law: Discovered) -> Tried:
-    """Forms of two signals: products, or on the floor a round patch."""
+    """Forms of two signals: products, or on the floor what grows along x or y, and a round patch."""
     s, t = at_knots(tuple(knots_by_signal(law).values()))
-    if (law.signal, law.second_signal) != ("x", "y"):
-        for name, shape in PRODUCTS.items():
-            yield name, {}, shape(s, t)
+    floor = (law.signal, law.second_signal) == ("x", "y")
+    for name, shape in (SLOPES if floor else PRODUCTS).items():
+        yield name, {}, shape(s, t)
+    if not floor:
         return
     width = min(np.ptp(s), np.ptp(t))
     for x0 in s.min() + BENDS * np.ptp(s):

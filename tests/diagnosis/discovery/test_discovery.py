@@ -105,6 +105,7 @@ def test_what_the_nominal_robot_has_as_well_is_taken_away():
     ("kind", "value", "form"),
     [
         (Kind("acceleration along", "v", "x", "y"), -2.0 * (np.hypot(S - 0.1, T + 0.1) < 0.35), "c within a circle"),
+        (Kind("acceleration along", "sin heading", "x", "y"), -0.5 * T, "c t"),
         (Kind("acceleration in heading", "1", "v", "w"), 0.4 * S - T - 3.0 * S * T, "c s t"),  # straight ones are rates
         (Kind("acceleration along", "1", "v", "w"), -3.0 * S * np.abs(T), "c s |t|"),
     ],
