@@ -1,8 +1,10 @@
-"""The curves that are discovered: one after the other, the one that brings most, until none is worth it.
+"""The laws that are discovered: one after the other, the one that brings most, until none is worth it.
 
 What a curve is worth is the smaller of its log evidence, less the price of having looked at so many kinds, and what it
 brings to stretches that it was not fitted to. The runs kept for judging have no part in this.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,41 +39,62 @@ ALIKE = 0.9
 kinds hold, brought 0.98 by the other one; other kinds at most 0.42 (three simulated robots)."""
 FEWEST = 8
 """Windows that a curve needs: two for each stretch that is left out once."""
+MOST_SETS = 3
+"""Of curves that a search follows. No other number was tried."""
+
+
+class Worthy(NamedTuple):
+    """A curve, and what it is worth in log evidence."""
+
+    worth: float
+    curve: Curve
 
 
 def discover(finding: Finding) -> list[Bending]:
-    """Fits with one curve, two and so on; none where nothing is worth it. Poses alone judge a curve."""
+    """Fits with one curve, two and so on; none where nothing is worth it. Poses alone judge a curve.
+
+    Where evidence hardly tells which curve comes first, the search goes on from each of these, and the set that is
+    worth most is kept: one curve may stand for two others together.
+    """
     windows = finding.data.windows._replace(wheels=None, turning=None)
-    now = Bending(finding.fit, (), finding.fit.covariance, finding.law)
-    found: list[Bending] = []
-    while len(windows.run) >= FEWEST and len(found) < MOST_LAWS:
-        more = _next(windows, now)
-        if more is None:
-            break
-        now = more
-        found.append(now)
-    return found
+    if len(windows.run) < FEWEST:
+        return []
+    begin = Bending(finding.fit, (), finding.fit.covariance, finding.law)
+    sets = [_go_on(windows, begin, first) for first in _near(windows, begin)[:MOST_SETS]]
+    return max(sets, key=lambda pair: pair[0])[1] if sets else []
 
 
-def _next(windows: Windows, now: Bending) -> Bending | None:
-    """One curve more; None if none is worth it. The noise is sized again beside it: a law sized beside a gap takes the
-    gap for slip."""
+def _go_on(windows: Windows, begin: Bending, first: Worthy) -> tuple[float, list[Bending]]:
+    """What a first curve and the best ones beside it are worth, and fits with one of them, two and so on."""
+    total, found = first.worth, [_with(windows, begin, first.curve)]
+    while len(found) < MOST_LAWS and (more := _near(windows, found[-1])):
+        total += more[0].worth
+        found.append(_with(windows, found[-1], more[0].curve))
+    return total, found
+
+
+def _with(windows: Windows, now: Bending, curve: Curve) -> Bending:
+    """The fit with one curve more. The noise is sized again beside it: a law sized beside a gap takes the gap for
+    slip."""
     data, _ = whiten(now.fit, windows, now.law)
-    curve = strongest(data, now.fit, now.curves)
-    if curve is None:
-        return None
     fit, curves, _ = refit_with(data, now.fit, (*now.curves, curve))
     responses = respond(np.exp(fit.vector[:2]), fit.linear.residual, windows)
     law = size_noise(fit.linear.residual, fit.linear.starts, windows, responses, LIKELY)
     return Bending(*refit_with(whiten(fit, windows, law)[0], fit, curves), law)
 
 
-def strongest(data: Data, fit: Solution, curves: tuple[Curve, ...]) -> Curve | None:
-    """The curve that brings most beside some others, about a fit that has these; None if none is worth SURE. Kinds that
-    bring nearly as much are told with it."""
+def _near(windows: Windows, now: Bending) -> list[Worthy]:
+    """The curves that bring most beside a fit, those within SURE of the best one, the best first."""
+    found = worthy(whiten(now.fit, windows, now.law)[0], now.fit, now.curves)
+    return [each for each in found if each.worth > found[0].worth - SURE]
+
+
+def worthy(data: Data, fit: Solution, curves: tuple[Curve, ...]) -> list[Worthy]:
+    """The curves that are worth SURE beside some others, about a fit that has these, the best first. Kinds that bring
+    nearly as much as one are told with it."""
     responses = respond(np.exp(fit.vector[:2]), fit.linear.residual, data.windows)
     base, prior = _base(data, fit, curves)
-    found: list[tuple[float, Curve]] = []
+    found: list[Worthy] = []
     for each in candidates(path_of(fit, data.windows, laws_from(curves)), responses):
         if any(each.kind == curve.kind for curve in curves):
             continue
@@ -79,13 +102,13 @@ def strongest(data: Data, fit: Solution, curves: tuple[Curve, ...]) -> Curve | N
         worth = min(bent.evidence - PRICE, bent.held_out)
         if worth > SURE:
             none = np.zeros(each.columns.shape[2])
-            found.append((worth, Curve(each.kind, each.at, none, none, bent.variance, each.density)))
-    if not found:
-        return None
-    most, best = max(found, key=lambda pair: pair[0])
-    return best._replace(
-        alike=tuple(curve.kind for worth, curve in found if curve is not best and worth > ALIKE * most)
-    )
+            found.append(Worthy(worth, Curve(each.kind, each.at, none, none, bent.variance, each.density)))
+    return [
+        one._replace(curve=one.curve._replace(alike=tuple(
+            other.curve.kind for other in found if other is not one and other.worth > ALIKE * one.worth
+        )))
+        for one in sorted(found, key=lambda one: -one.worth)
+    ]  # fmt: skip
 
 
 def _base(data: Data, fit: Solution, curves: tuple[Curve, ...]) -> tuple[np.ndarray, np.ndarray]:
