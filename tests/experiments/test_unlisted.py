@@ -8,9 +8,14 @@ import pytest
 import jaxident as ji
 from experiments.unlisted.measure import achieved, as_logs, table, true_model
 from experiments.unlisted.page import law_of, write
-from experiments.unlisted.robots import KINDS, draw_robot, drive
+from experiments.unlisted.robots import KINDS, RUNS, draw_robot, drive
 from jaxident.diagnosis.account.discovered import Shown
+from jaxident.diagnosis.causes.finding import find_effects
+from jaxident.diagnosis.discovery.fit import as_law
+from jaxident.diagnosis.discovery.forms import form_of
 from jaxident.diagnosis.discovery.kinds import Kind
+from jaxident.diagnosis.discovery.search import discover
+from jaxident.diagnosis.preparation.prepare import prepare
 from jaxident.files.diagnosis import law_to_dict
 from jaxident.robot.model import Discovered
 
@@ -60,3 +65,28 @@ def test_table_and_page_tell_of_every_robot(tmp_path):
     page = (tmp_path / "page.html").read_text()
     assert "75 %" in page
     assert "nothing to take" in page
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("hidden", "first"),
+    [
+        ("patch", Kind("acceleration along", "v", "x", "y")),
+        ("saddle", Kind("acceleration along", "cos heading", "x", "y")),
+        ("hot", Kind("push of each wheel", "own push", "own heat 3 s")),
+        ("castor", Kind("acceleration along", "v", "since reversal")),
+        ("coupled", Kind("acceleration in heading", "w", "v")),
+    ],
+)
+def test_the_law_that_is_found_first_acts_where_the_hidden_effect_does(hidden, first):
+    robot = draw_robot(np.random.default_rng([1, 1]))
+    logs = as_logs(drive(robot, hidden, 1.0, RUNS, 1002))
+    found = discover(find_effects(prepare(logs, None))[1])
+    assert found
+    assert found[0].curves[0].kind == first
+    if hidden == "patch":
+        law = as_law(found[0].curves[0])
+        form = form_of(law, found[0].curves[0].density)
+        assert form is not None
+        assert np.hypot(form.parameters["x0"] - 0.2, form.parameters["y0"] + 0.1) < 0.1
+        assert abs(form.parameters["radius"] - 0.35) < 0.1

@@ -208,21 +208,6 @@ def test_laws_that_explain_as_much_are_named():
 
 
 @pytest.mark.slow
-def test_a_round_carpet_is_found_as_a_surface():
-    """No curve of x or of y makes it."""
-    floor = np.linspace(-1.5, 1.5, 8)
-    x, y = np.meshgrid(floor, floor, indexing="ij")
-    law = Discovered("acceleration along", "v", "x", floor, -4.0 * (np.hypot(x, y) < 0.7), None, "y", floor)
-    first = searched(dataclasses.replace(ROBOT, discovered=(law,)), 5)[0].curves[0]
-    assert first.kind == Kind("acceleration along", "v", "x", "y")
-    places = np.meshgrid(*first.at, indexing="ij")
-    known = first.density > 40
-    inside = (np.hypot(*places) < 0.5).ravel() & known
-    outside = (np.hypot(*places) > 0.9).ravel() & known
-    assert abs(np.mean(first.value[outside]) - np.mean(first.value[inside]) - 4.0) < 1.0
-
-
-@pytest.mark.slow
 def test_robots_with_nothing_to_discover_have_no_curve():
     assert [len(searched(ROBOT, seed)) for seed in range(2, 8)] == [0] * 6
 
