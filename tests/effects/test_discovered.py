@@ -12,6 +12,7 @@ from jaxident.diagnosis.discovery.kinds import KINDS
 from jaxident.effects.catalogue import BY_KIND
 from jaxident.effects.discovered import laws_of, shifted, with_laws
 from jaxident.effects.law_kinds import ACTS, MOST_KNOTS, MOST_LAWS, MOST_SECOND, check_discovered
+from jaxident.effects.past import past_of
 from jaxident.errors import InputError
 from jaxident.estimation.ahead.beyond_range import beyond_range, signals
 from jaxident.estimation.ahead.stretches import Starts, every
@@ -100,6 +101,16 @@ def test_commands_in_another_unit_move_the_robot_alike():
     mine = Discovered("push of each wheel", "1", "own push", PUSHES, 0.2 * PUSHES**3)
     for one, other in zip(laws_of([given], 100.0), laws_of([mine]), strict=True):
         np.testing.assert_allclose(one, other)
+
+
+def test_heat_of_commands_in_another_unit_moves_the_robot_alike():
+    """Heat goes with the square of the command; a part of the push has no unit."""
+    given = Discovered("push of each wheel", "own push", "own heat 3 s", 1e4 * HEATS, -0.5 * HEATS)
+    mine = Discovered("push of each wheel", "own push", "own heat 3 s", HEATS, -0.5 * HEATS)
+    for one, other in zip(laws_of([given], 100.0), laws_of([mine]), strict=True):
+        np.testing.assert_allclose(one, other)
+    t, command = STEP * np.arange(ROWS), np.random.default_rng(0).normal(size=(ROWS, 2))
+    np.testing.assert_allclose(past_of(t, 100.0 * command).heat, 1e4 * past_of(t, command).heat)
 
 
 def test_a_curve_is_straight_between_its_knots_and_constant_beyond():

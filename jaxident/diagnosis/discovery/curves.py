@@ -2,9 +2,10 @@
 where it was not fitted.
 
 The values at the knots are normal about zero, with the precision (D' D + FLAT I) / s^2, D second differences: a
-penalised spline (Eilers, Marx 1996, Statistical Science 11). For a surface D' D is the sum of those along both signals
-(Eilers, Marx 2003, Chemometrics and Intelligent Laboratory Systems 66). s is the one of greatest restricted likelihood,
-nominal parameters, effects and start states being free; no smoothing is set by hand.
+penalised spline (Eilers, Marx 1996, Statistical Science 11). For a surface D holds first differences along both signals
+(Eilers, Marx 2003, Chemometrics and Intelligent Laboratory Systems 66, has second ones): where the robot was not, it is
+as it is nearby, and goes on in no straight line. s is the one of greatest restricted likelihood, nominal parameters,
+effects and start states being free; no smoothing is set by hand.
 """
 
 from collections.abc import Sequence

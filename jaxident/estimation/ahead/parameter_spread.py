@@ -16,8 +16,8 @@ STEP = 1e-4
 """Part of a parameter's size, or of its deviation if that is smaller, by which a robot is moved."""
 MOST = 48
 """Robots at most, each of which costs a run of the filter. A surface alone has 64 values. Where more directions are
-independent, so many random mixtures of them are taken: a variance is then off by 16 % (141 directions; the square root
-of 2 / MOST times the part left out)."""
+independent, so many random mixtures of them are taken: a variance then has a standard error of 16 % (of 141
+directions: the square root of 2 / MOST, times the part left out)."""
 FURTHER = 0.5
 """Part of the range of a discovered law's knots over which it may go on beyond them. No other value was tried."""
 NO_SIZE = 1e-6
