@@ -14,10 +14,10 @@ from jaxident.robot.model import Discovered, Model, require_physical
 
 STEP = 1e-4
 """Part of a parameter's size, or of its deviation if that is smaller, by which a robot is moved."""
-MOST = 48
-"""Robots at most, each of which costs a run of the filter. A surface alone has 64 values. Where more directions are
-independent, so many random mixtures of them are taken: a variance then has a standard error of 16 % (of 141
-directions: the square root of 2 / MOST, times the part left out)."""
+MOST, MIXED = 48, 24
+"""Directions that are followed one by one, each of which costs a run of the filter, and random mixtures that stand for
+more of them: a surface alone has 64 values. A variance then has a standard error of 26 % (of 141 directions: the square
+root of 2 / MIXED, times the part left out), a standard deviation one of 13 %."""
 FURTHER = 0.5
 """Part of the range of a discovered law's knots over which it may go on beyond them. No other value was tried."""
 NO_SIZE = 1e-6
@@ -65,15 +65,15 @@ def _continued(law: Discovered) -> list[Discovered]:
 
 
 def _roots(covariance: Array) -> np.ndarray:
-    """Rows (n, n) whose outer products add up to a covariance (n, n); with more than MOST, so many whose outer products
-    do so on average."""
+    """Rows (n, n) whose outer products add up to a covariance (n, n); of more than MOST, MIXED rows whose outer
+    products do so on average."""
     deviation = np.sqrt(np.maximum(np.diagonal(covariance), 1e-300))
     values, vectors = np.linalg.eigh(covariance / deviation / deviation[:, None])
     roots = (vectors * np.sqrt(np.maximum(values, 0.0))).T * deviation
     if len(roots) <= MOST:
         return roots
-    mixed, _ = np.linalg.qr(np.random.default_rng(0).normal(size=(len(roots), MOST)))
-    return np.sqrt(len(roots) / MOST) * mixed.T @ roots
+    mixed, _ = np.linalg.qr(np.random.default_rng(0).normal(size=(len(roots), MIXED)))
+    return np.sqrt(len(roots) / MIXED) * mixed.T @ roots
 
 
 def _sizes(names: list[str], values: Array) -> np.ndarray:

@@ -7,7 +7,7 @@ import pytest
 
 import jaxident as ji
 from jaxident.effects.law_kinds import value_name
-from jaxident.estimation.ahead.parameter_spread import MOST, directions, parameter_values, with_values
+from jaxident.estimation.ahead.parameter_spread import MIXED, directions, parameter_values, with_values
 from jaxident.estimation.ahead.run_ahead import run_ahead
 from jaxident.estimation.ahead.stretches import every
 from jaxident.robot.drive import Physical
@@ -45,7 +45,7 @@ def test_directions_add_up_to_the_covariance():
 
 
 def test_many_directions_are_mixed_into_a_few_that_spread_as_much():
-    """A surface has 64 values. A sum of squares over MOST mixtures is off by a share of sqrt(2 / MOST), one standard
+    """A surface has 64 values. A sum of squares over MIXED mixtures is off by a share of sqrt(2 / MIXED), one standard
     deviation; so is that of what any linear prediction makes of them."""
     knots, rng = np.linspace(-1.0, 1.0, 8), np.random.default_rng(5)
     surface = Discovered("acceleration along", "v", "x", knots, rng.normal(size=(8, 8)), None, "y", knots)
@@ -56,11 +56,11 @@ def test_many_directions_are_mixed_into_a_few_that_spread_as_much():
     here = np.ravel(surface.value)
     own = [(other.discovered[0], size) for other, size in directions(model) if other.discovered[0].value.size == 64]
     moved = np.array([(np.ravel(law.value) - here) / size for law, size in own])
-    assert len(moved) == MOST
+    assert len(moved) == MIXED
     looks = rng.normal(size=(64, 200))
     ratio = np.sum((moved @ looks) ** 2, axis=0) / np.sum(looks * (model.covariance @ looks), axis=0)
     assert abs(ratio.mean() - 1.0) < 0.1
-    assert ratio.std() < np.sqrt(2.0 / MOST)
+    assert ratio.std() < np.sqrt(2.0 / MIXED)
 
 
 def test_a_law_may_go_on_beyond_its_knots_as_steep_as_it_is_inside():
