@@ -63,9 +63,8 @@ def _turning(now: Now, size: float, rng) -> Added:
 
 def _friction(now: Now, size: float, rng) -> Added:
     """A rubbing seal: a drag that hardly grows with speed."""
-    return -0.25 * size * np.sign(now.v) * np.abs(now.v / 0.1) ** 0.4, -1.0 * size * np.sign(now.w) * np.abs(
-        now.w
-    ) ** 0.4
+    along, heading = (np.sign(speed) * np.abs(speed / slow) ** 0.4 for speed, slow in ((now.v, 0.1), (now.w, 1.0)))
+    return -0.25 * size * along, -1.0 * size * heading
 
 
 def _coupled(now: Now, size: float, rng) -> Added:

@@ -28,7 +28,7 @@ SEEN = (
     "These laws are in no catalogue. They were found on the runs that fit, and runs that took no part in that confirm "
     "them. Each adds a curve of one signal, or a surface of two, at one place. The corrected model has them, and "
     "`predict`, `simulate`, `plan` and studies run them. Beyond the signals that these logs show, a law stays at its "
-    "last value. That is a guess, and `predict` warns where it is made."
+    "last value. That is a guess: `predict` warns where it is made, and is less sure there."
 )
 OF_CURVE = "Line: the curve; shade: two standard deviations; grey bars: how often the robot was there. "
 OF_MAP = (
