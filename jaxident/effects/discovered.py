@@ -26,7 +26,7 @@ from jaxident.effects.law_kinds import (
     HEATS,
     MOST_KNOTS,
     MOST_LAWS,
-    MOST_SECOND,
+    MOST_SURFACE_KNOTS,
     SIDEWAYS,
     SIGNALS,
     TIMES,
@@ -78,7 +78,7 @@ def laws_of(laws: Sequence[Discovered], largest: float = 1.0, surfaces: bool | N
     names = list(SIGNALS)
     codes = [(list(ACTS).index(law.acts_on), list(TIMES).index(law.times), names.index(law.signal),
               names.index(law.second_signal or law.signal)) for law in laws]  # fmt: skip
-    rows = [_padded(law, MOST_SECOND if wide else 1) for law in laws]
+    rows = [_padded(law, MOST_SURFACE_KNOTS if wide else 1) for law in laws]
     return Laws(*np.array(codes).T, *(np.stack(column) for column in zip(*rows, strict=True)))
 
 

@@ -15,7 +15,7 @@ HEATS = {f"own heat {tau:g} s": tau for tau in HEAT_TIMES}
 """Signals that remember the wheel's own command, and the time constant [s] of each."""
 DISCOVERED = "discovered"
 """The key of laws among the settings of a program."""
-MOST_LAWS, MOST_KNOTS, MOST_SECOND = 3, 16, 9
+MOST_LAWS, MOST_KNOTS, MOST_SURFACE_KNOTS = 3, 16, 9
 """Laws of one model, knots of a curve, and knots of a surface along each of its signals. Every set of curves runs
 through one compiled program, every set with a surface through another."""
 ACTS = {
@@ -56,7 +56,7 @@ def check_discovered(laws: Sequence[Discovered]) -> None:
         raise InputError(f"{len(laws)} discovered laws; at most {MOST_LAWS} are possible")
     for law in laws:
         _check_kind(law)
-        knots, most = knots_by_signal(law).values(), MOST_SECOND if law.second_signal else MOST_KNOTS
+        knots, most = knots_by_signal(law).values(), MOST_SURFACE_KNOTS if law.second_signal else MOST_KNOTS
         for at in knots:
             if not 2 <= len(at) <= most:
                 raise InputError(f"discovered: {len(at)} knots; 2 to {most} are possible")
@@ -80,7 +80,7 @@ def _check_kind(law: Discovered) -> None:
     by_camera, own = law.acts_on in BY_CAMERA, any(signal.startswith("own ") for signal in signals)
     if by_camera and (not signals <= set(OF_CAMERA) or law.times != "1"):
         raise InputError(f"discovered: an error of the camera is 1 times a curve of {' or '.join(OF_CAMERA)}")
-    if not own == (law.acts_on == WHEELS) == (own and not law.second_signal):
+    if own != (law.acts_on == WHEELS) or (own and law.second_signal):
         raise InputError("discovered: a push of each wheel is a curve of the wheel's own speed, push or heat")
     if law.times not in (("1", "own push") if own else (name for name in TIMES if name != "own push")):
         raise InputError(f"discovered: {law.times} times a curve of {law.signal}: no program multiplies these")

@@ -19,10 +19,9 @@ HEAT_TIMES = (1.0, 3.0, 10.0)
 LONGEST = 2.0
 """Time since a reversal [s] beyond which it does not matter how long ago that was, and from which a run starts. No
 other value was tried."""
-
-
 ROWS = 512
-"""Runs are filled up to a power of two times these rows, so that one program serves many lengths."""
+"""Runs are filled up to a power of two times these rows, so that one program serves many lengths. No other number was
+tried."""
 
 
 class Past(NamedTuple):

@@ -66,12 +66,12 @@ class Effect:
 @jax.tree_util.register_dataclass
 @dataclasses.dataclass(frozen=True)
 class Discovered:
-    """A law in no catalogue that logs showed: `acts_on` gets `times` ("1", "v" or "w") times a curve of a signal, or
-    times a surface of two.
+    """A law in no catalogue that logs showed: `acts_on` gets `times` times a curve of a signal, or times a surface of
+    two. What these three may be, and their units: ACTS, TIMES and SIGNALS of `effects.law_kinds`.
 
     at, value (knots,): the curve, straight between the knots and constant beyond; standard_deviation (knots,) of its
-    values, or None. A surface has a second_signal, second_at (second knots,) and values (knots, second knots). Kinds,
-    signals and units: `effects.discovered`.
+    values, or None. A surface has a second_signal, second_at (second knots,), and values and deviations (knots, second
+    knots).
     """
 
     acts_on: str = dataclasses.field(metadata={"static": True})

@@ -11,7 +11,7 @@ from jaxident.array_types import AT_REST, Pose
 from jaxident.diagnosis.discovery.kinds import KINDS
 from jaxident.effects.catalogue import BY_KIND
 from jaxident.effects.discovered import laws_of, shifted, with_laws
-from jaxident.effects.law_kinds import ACTS, MOST_KNOTS, MOST_LAWS, MOST_SECOND, check_discovered
+from jaxident.effects.law_kinds import ACTS, MOST_KNOTS, MOST_LAWS, MOST_SURFACE_KNOTS, check_discovered
 from jaxident.effects.past import past_of
 from jaxident.errors import InputError
 from jaxident.estimation.ahead.beyond_range import beyond_range, signals
@@ -166,7 +166,7 @@ BAD = (
     ({"times": "u"}, "times is 'u'"),
     ({"at": TURNS[::-1]}, "knots are out of order"),
     ({"value": TURNS[1:]}, "9 knots and 8 values"),
-    ({"second_signal": "w", "second_at": np.arange(10.0)}, f"10 knots; 2 to {MOST_SECOND}"),
+    ({"second_signal": "w", "second_at": np.arange(10.0)}, f"10 knots; 2 to {MOST_SURFACE_KNOTS}"),
     ({"second_signal": "v", "second_at": TURNS[:3]}, "two signals are needed"),
     ({"second_signal": "weather", "second_at": TURNS[:3]}, "second_signal is 'weather'"),
     ({"at": TURNS[:4], "second_signal": "w", "second_at": TURNS[:3]}, "4 x 3 knots and 9 values"),

@@ -38,7 +38,7 @@ def errors(kind: str, size: float = 1.0) -> float:
 
 
 def test_a_robot_without_an_effect_is_the_packages():
-    assert errors("nothing") < 0.012  # the heading's noise at the start, over 3 s, and slip
+    assert errors("nothing") < 0.012  # the heading's noise at the start, over 6 s, and slip
 
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in ("nothing", "bumps", "cogs", "oval")])

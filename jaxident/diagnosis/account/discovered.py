@@ -56,12 +56,14 @@ class Confirmed(NamedTuple):
 
 
 def confirm(prepared: Prepared, finding: Finding, direct: dict, seed: int, plain: Corrected) -> Confirmed | None:
-    """The most curves, in the order in which they were found, that together take error away on the judging rows, 95 %
-    surely, and of which the last takes some beside the others; None if none do. Two halves of one law may do so
-    together only. The judging rows accept or refuse: they change no number of a curve. plain: the corrected model
-    without curves."""
+    """The most curves, in the order in which they were found, that the judging rows confirm; None if none.
+
+    A curve is confirmed if, beside those confirmed before it, it takes error away, 95 % surely. Two halves of one law
+    may do so together only; the second then takes some away beside the first. The judging rows accept or refuse: they
+    change no number of a curve. plain: the corrected model without curves.
+    """
     steps: list[Judged] = []
-    found = None
+    found, confirmed = None, 0
     for bending in discover(finding):
         steps = steps or [judge_model(_plain(plain.model), prepared)]
         whole, draws = sized_corrected(prepared, beside(finding, bending), direct, seed, bending)
@@ -69,9 +71,10 @@ def confirm(prepared: Prepared, finding: Finding, direct: dict, seed: int, plain
         steps = [*steps, judge_model(_plain(whole.model), prepared)]
         (share, p_value), (more, _) = (
             taken(before.error, steps[-1].error, steps[0].error ** 2 / unit, unit, seed)
-            for before in (steps[0], steps[-2])
+            for before in (steps[confirmed], steps[-2])
         )
         if min(share, more) > 0.0 and p_value < LOW:
+            confirmed = len(steps) - 1
             named = corrected_of(prepared, finding, whole.law, direct)
             found = Confirmed(bending, whole, named, draws, steps)
     return found

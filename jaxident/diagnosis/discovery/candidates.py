@@ -7,6 +7,7 @@ poses to these, linear about a fitted path.
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
+import jax
 import numpy as np
 
 from jaxident.array_types import Array
@@ -19,9 +20,10 @@ from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.discovered import Laws
 from jaxident.effects.law_kinds import AHEAD, ALONG, BY_CAMERA, HEADING, HEATS, LEFT, SIDEWAYS, TURN, WHEELS
 
+_left_behind = jax.jit(left_behind)
 KNOTS = 10
 """Of a curve. No other number was tried."""
-SECOND_KNOTS = 8
+SURFACE_KNOTS = 8
 """Of a surface along each of its signals, one less than a program has room for (`ahead.parameter_spread`). No other
 number was tried."""
 INSIDE = (0.01, 0.99)
@@ -56,7 +58,7 @@ def path_of(fit: Solution, windows: Windows, laws: Laws | None = None) -> Path:
     x, y, theta, v, w, push = (np.asarray(part) for part in motion)
     rates, gain = np.exp(fit.vector[:2]), fit.vector[2:6].reshape(2, 2)
     speeds = np.stack([rates[0] * v, rates[1] * w], axis=-1) @ np.linalg.pinv(gain).T
-    step, past = np.asarray(windows.step).T, left_behind(windows)
+    step, past = np.asarray(windows.step).T, _left_behind(windows)
     begin = windows.session[windows.run] + windows.t[windows.first, windows.run]
     time = begin[:, None] + np.cumsum(step, axis=1) - step
     heading = (theta + np.pi) % (2.0 * np.pi) - np.pi
@@ -76,7 +78,7 @@ def candidates(path: Path, responses: Responses) -> Iterator[Candidate]:
         signals = _signals(kind, path)
         ranges = [np.quantile(signal, INSIDE) for signal in signals]
         if all(high - low > VARIED for low, high in ranges):
-            at = tuple(np.linspace(low, high, SECOND_KNOTS if kind.second_signal else KNOTS) for low, high in ranges)
+            at = tuple(np.linspace(low, high, SURFACE_KNOTS if kind.second_signal else KNOTS) for low, high in ranges)
             density = _nearest(signals, at)
             yield Candidate(kind, at, columns_of(kind, at, path, responses), density)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.effects.catalogue import CATALOGUE
-from jaxident.effects.law_kinds import MOST_KNOTS, MOST_SECOND, knots_by_signal, value_name
+from jaxident.effects.law_kinds import MOST_KNOTS, MOST_SURFACE_KNOTS, knots_by_signal, value_name
 from jaxident.robot.drive import Physical
 from jaxident.robot.model import Discovered, Model, require_physical
 
@@ -49,7 +49,7 @@ def _continued(law: Discovered) -> list[Discovered]:
     """A law that goes on beyond each end of its knots, as steep as it is inside (root mean square), STEP of that: what
     it does there nobody has seen. From FURTHER of its range on it is constant again."""
     value, found = np.asarray(law.value, float), []
-    most = MOST_SECOND if law.second_signal else MOST_KNOTS
+    most = MOST_SURFACE_KNOTS if law.second_signal else MOST_KNOTS
     for axis, at in enumerate(knots_by_signal(law).values()):
         if len(at) == most:
             continue  # no room for a knot more

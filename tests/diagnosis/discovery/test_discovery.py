@@ -8,7 +8,7 @@ import pytest
 
 import jaxident as ji
 from jaxident.diagnosis.causes.finding import find_effects
-from jaxident.diagnosis.discovery.candidates import SECOND_KNOTS, Path, columns_of, hats
+from jaxident.diagnosis.discovery.candidates import SURFACE_KNOTS, Path, columns_of, hats
 from jaxident.diagnosis.discovery.curves import bend, precision, solved
 from jaxident.diagnosis.discovery.fit import Curve, as_law, prior_of
 from jaxident.diagnosis.discovery.forms import beyond, form_of
@@ -24,7 +24,7 @@ from jaxident.robot.noise import Noise
 
 KNOTS = 10
 AT = np.linspace(-1.0, 1.0, KNOTS)
-FLOOR = np.linspace(-0.7, 0.7, SECOND_KNOTS)
+FLOOR = np.linspace(-0.7, 0.7, SURFACE_KNOTS)
 S, T = np.meshgrid(FLOOR, FLOOR, indexing="ij")
 
 
@@ -128,7 +128,7 @@ def test_a_surface_answers_as_its_knots_say():
     answer = rng.normal(size=(2, 90, 30))
     path = Path({"x": x, "y": y, "v": v}, {}, np.eye(2), np.ones((2, 90)))
     columns = columns_of(Kind("acceleration along", "v", "x", "y"), (FLOOR, FLOOR), path, Responses(answer, None, None))
-    value = rng.normal(size=(SECOND_KNOTS, SECOND_KNOTS))
+    value = rng.normal(size=(SURFACE_KNOTS, SURFACE_KNOTS))
     rows = np.array([np.interp(np.ravel(y), FLOOR, row) for row in value])
     there = [np.interp(s, FLOOR, column) for s, column in zip(np.ravel(x), rows.T, strict=True)]
     np.testing.assert_allclose(
