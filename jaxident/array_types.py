@@ -39,7 +39,6 @@ UnknownsMatrix = Float[Array, "unknowns unknowns"]
 RobotVector = Float[Array, "8"]  # two rates, four gains, two dead zones
 RobotMatrix = Float[Array, "8 8"]
 StateVector = Float[Array, "5"]  # x, y, theta, v, w
-StateMatrix = Float[Array, "5 5"]
 PoseVector = Float[Array, "3"]  # x, y, theta
 PoseMatrix = Float[Array, "3 3"]
 Rows = Float[Array, "rows"]  # one number per row of a run

@@ -29,8 +29,15 @@ from jaxident.array_types import Array, Pose, PoseVector, RobotMatrix, RobotVect
 from jaxident.array_types import State as Motion
 from jaxident.errors import InputError
 from jaxident.estimation.online.joint_start import begin_from_model, begin_from_run, unsure
-from jaxident.estimation.online.joint_step import PARAMETERS, SENSOR_AT, Drift, advance_belief, take_in_wheels
-from jaxident.estimation.poses.filter import Belief, take_in
+from jaxident.estimation.online.joint_step import (
+    PARAMETERS,
+    SENSOR_AT,
+    Drift,
+    advance_belief,
+    take_in_pose,
+    take_in_wheels,
+)
+from jaxident.estimation.poses.filter import Belief
 from jaxident.estimation.poses.noise_law import NOISE_LAWS
 from jaxident.estimation.poses.parameters import NAMES
 from jaxident.estimation.poses.runs import Runs, stack_runs, with_wheels
@@ -148,7 +155,7 @@ def step(state: State, sample: Sample) -> tuple[State, Info]:
     pose = jnp.where(seen, pose, 0.0)
     lost = seen & (state.strikes >= LOST_AFTER)
     expected = _choose(lost, _search_at(expected, pose, state.noise), expected)
-    corrected, (error, _) = take_in(expected, pose, seen, state.noise, LIMIT)
+    corrected, error = take_in_pose(expected, pose, seen, state.noise, LIMIT)
     used = seen & jnp.all(jnp.abs(error) < GATE)
     belief = _choose(used, corrected, expected)
     if state.wheel_noise is not None and sample.wheel_r is not None:

@@ -6,9 +6,10 @@ import jax
 import jax.numpy as jnp
 from jax.scipy.stats import norm
 
-from jaxident.array_types import Array, PerWheel, Wheels
-from jaxident.estimation.poses.filter import Belief, advance_with_slopes, step_weights
-from jaxident.robot.drive import Physical, hold
+from jaxident.array_types import Array, PerWheel, PoseVector, State, Wheels
+from jaxident.estimation.poses.filter import Belief, advance_with_slopes, dense
+from jaxident.numerics import wrap
+from jaxident.robot.drive import Force, Physical, hold
 from jaxident.robot.noise import Noise
 
 PARAMETERS = 8
@@ -41,10 +42,10 @@ def advance_belief(
     pull = jnp.sum(gain * passed, axis=1)
 
     def moved(log_rate):
-        found = advance_with_slopes(
-            mean[:5], pull, step_weights(hold(Physical(jnp.exp(log_rate), gain, coupling), step))
-        )
-        return found[0], found
+        solution = hold(Physical(jnp.exp(log_rate), gain, coupling), step)
+        after, slopes = advance_with_slopes(State(*mean[:5]), Force(*pull), solution)
+        state = jnp.stack(after)
+        return state, (state, dense(slopes.by_state), dense(slopes.by_pull))
 
     by_rate, (state, by_state, by_pull) = jax.jacfwd(moved, has_aux=True)(unknowns[:2])
     by_gain = (by_pull[:, :, None] * passed).reshape(5, 4)
@@ -74,6 +75,26 @@ def expected_output(command: PerWheel, width: PerWheel, deviation: PerWheel) -> 
     share = norm.cdf(clear)
     side = jnp.sign(command)
     return side * deviation * (clear * share + norm.pdf(clear)), -side * share
+
+
+def take_in_pose(
+    belief: Belief, pose: PoseVector, seen: Array, noise: Noise, limit: float
+) -> tuple[Belief, PoseVector]:
+    """The belief after a pose (3,), and its innovations (3,) over their standard deviations; 0 where unseen. Beyond
+    `limit` deviations an innovation counts no more than one of that size (Huber 1964)."""
+    mean, covariance = belief
+    memory = noise.correlation_time is not None
+    normalised = []
+    for k, sd in enumerate((noise.position, noise.position, noise.heading)):
+        shared = covariance[:, k] + covariance[:, 5 + k] if memory else covariance[:, k]
+        variance = shared[k] + shared[5 + k] if memory else shared[k] + sd**2
+        error = pose[k] - (mean[k] + mean[5 + k] if memory else mean[k])
+        error = wrap(error) if k == 2 else error
+        gain, size = jnp.where(seen, shared / variance, 0.0), jnp.sqrt(variance)
+        mean = mean + gain * jnp.clip(error, -limit * size, limit * size)
+        covariance = covariance - gain[:, None] * shared
+        normalised.append(jnp.where(seen, error / size, 0.0))
+    return Belief(mean, covariance), jnp.stack(normalised)
 
 
 def take_in_wheels(

@@ -3,6 +3,10 @@
 States x, y, theta, v, w, and with camera error of a memory the three errors too; linearised about the filtered path
 (Jazwinski 1970, section 8.3). Slip is an acceleration held over each step, of variance density^2 / step. The three
 coordinates of a pose are taken in one after the other, which needs no matrix inverse.
+
+Inside the loop over rows each entry of a mean or a matrix is a signal of its own, and zeros by construction are left
+out (None). Derivatives and runs then make each entry one long row of numbers. As arrays (5, 5) they made loops over
+five: six runs of 1000 rows, with all derivatives, took eight times as long.
 """
 
 from typing import Any, NamedTuple
@@ -10,10 +14,15 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxident.array_types import Array, PerChannel, PoseRows, PoseVector, State, StateMatrix, StateVector
+from jaxident.array_types import Array, Pose, PoseRows, State
 from jaxident.numerics import GAUSS_WEIGHTS, sin_cos, wrap
-from jaxident.robot.drive import Force, Hold, Response
+from jaxident.robot.drive import Force, Hold, weigh
 from jaxident.robot.noise import Noise
+
+STATES = 5
+Entry = Any
+"""A number of a matrix, whatever its shape; None for a zero by construction."""
+Rows = tuple[tuple[Entry, ...], ...]
 
 
 class Belief(NamedTuple):
@@ -23,123 +32,179 @@ class Belief(NamedTuple):
     covariance: Any
 
 
+class Entries(NamedTuple):
+    """A belief entry by entry: mean, and rows of the covariance from the diagonal on."""
+
+    mean: tuple
+    covariance: Rows
+
+
+class RowInnovations(NamedTuple):
+    """Of one row: normalised innovations of x, y and theta, and the logarithms of their variances."""
+
+    normalised: tuple
+    log_variance: tuple
+
+
+class Slopes(NamedTuple):
+    """Derivatives of the state after a step, five rows each: by the state before, and by a held acceleration along and
+    in heading."""
+
+    by_state: Rows
+    by_pull: Rows
+
+
 def filter_run(solution: Hold, pull: Force, start: State, noise: Noise, run) -> tuple[PoseRows, PoseRows]:
     """Normalised innovations and log variances (3, rows) of one run (rows,), the start state taken as known.
 
     `solution` is that of one step, or of each (rows - 1,); `pull` (rows,).
     """
     _, (normalised, log_variance) = scan_filter(solution, pull, first_belief(start, noise), noise, run)
-    return normalised.T, log_variance.T
+    return normalised, log_variance
 
 
 def first_belief(start: State, noise: Noise) -> Belief:
     """A known start state, and camera errors as they are in the long run."""
     if noise.correlation_time is None:
-        return Belief(jnp.stack(start), jnp.zeros((5, 5)))
-    zeros = jnp.zeros(5)
+        return Belief(jnp.stack(start), jnp.zeros((STATES, STATES)))
+    zeros = jnp.zeros(STATES)
     variance = jnp.stack([noise.position, noise.position, noise.heading]) ** 2
     return Belief(jnp.concatenate([jnp.stack(start), zeros[:3]]), jnp.diag(jnp.concatenate([zeros, variance])))
 
 
-def scan_filter(solution: Hold, pull: Force, belief: Belief, noise: Noise, run):
-    """The filter over all rows: the belief after the last pose, and innovations of every row (rows, 3)."""
-    weights = step_weights(solution)
+def scan_filter(solution: Hold, pull: Force, belief: Belief, noise: Noise, run) -> tuple[Belief, tuple[Array, Array]]:
+    """The filter over all rows: the belief after the last pose, and innovations and log variances of every row
+    (3, rows)."""
     even = jnp.ndim(solution.step) == 0
-    poses = jnp.stack(run.pose, axis=-1)
-    pulls = jnp.stack(pull, axis=-1)[:-1]  # a last command acts on nothing any more, and may be missing
 
     def body(belief, now):
         pull, own, pose, seen = now
         belief, found = take_in(belief, pose, seen, noise)
-        return predict_belief(belief, pull, weights if even else own, noise), found
+        return predict_belief(belief, pull, solution if even else own, noise), found
 
-    belief, found = jax.lax.scan(body, belief, (pulls, None if even else weights, poses[:-1], run.seen[:-1]))
-    belief, last = take_in(belief, poses[-1], run.seen[-1], noise)
-    return belief, jax.tree.map(lambda rows, row: jnp.concatenate([rows, row[None]]), found, last)
-
-
-class StepWeights(NamedTuple):
-    """A `Hold` as matrices over (v, w, along, heading): speed and turn at the nodes (nodes, 4), turn, v and w at the
-    end (3, 4); step [s]. All with leading axis (rows - 1,) for uneven steps."""
-
-    step: Any
-    node_v: Any
-    node_turn: Any
-    end: Any
+    pulls = Force(*(part[:-1] for part in pull))  # a last command acts on nothing any more, and may be missing
+    early = Pose(*(part[:-1] for part in run.pose))
+    rows = pulls, None if even else solution, early, run.seen[:-1]
+    entries, found = jax.lax.scan(body, entries_of(belief), rows)
+    entries, last = take_in(entries, Pose(*(part[-1] for part in run.pose)), run.seen[-1], noise)
+    whole = jax.tree.map(lambda rows, row: jnp.concatenate([rows, row[None]]), found, last)
+    return belief_of(entries), (jnp.stack(whole.normalised), jnp.stack(whole.log_variance))
 
 
-def step_weights(solution: Hold) -> StepWeights:
-    """The exact solution over a step as matrices."""
-
-    def rows(responses: tuple[Response, ...]) -> Array:
-        zero = jnp.zeros_like(solution.step)
-        return jnp.stack([jnp.stack([zero if r is None else r for r in one], -1) for one in responses], -2)
-
-    end = rows((solution.turn, solution.v, solution.w))
-    return StepWeights(solution.step, rows(solution.node_v), rows(solution.node_turn), end)
+def entries_of(belief: Belief) -> Entries:
+    """A belief entry by entry."""
+    size = len(belief.mean)
+    rows = tuple(tuple(belief.covariance[i, j] for j in range(i, size)) for i in range(size))
+    return Entries(tuple(belief.mean), rows)
 
 
-def take_in(
-    belief: Belief, pose: PoseVector, seen: Array, noise: Noise, limit: float | None = None
-) -> tuple[Belief, tuple[PoseVector, PoseVector]]:
-    """The belief after a pose (3,), and its normalised innovations and log variances (3,); 0 where unseen.
+def belief_of(entries: Entries) -> Belief:
+    """A belief as a vector and a matrix."""
+    size = len(entries.mean)
+    return Belief(jnp.stack(entries.mean), dense(tuple(_row(entries.covariance, i) for i in range(size))))
 
-    limit: standard deviations beyond which an innovation counts no more than one of that size (Huber 1964).
-    """
+
+def dense(rows: Rows) -> Array:
+    """A matrix from its rows of numbers."""
+    return jnp.stack([jnp.stack([jnp.asarray(0.0 if entry is None else entry) for entry in row]) for row in rows])
+
+
+def take_in(belief: Entries, pose: Pose, seen: Array, noise: Noise) -> tuple[Entries, RowInnovations]:
+    """The belief after a pose, its normalised innovations and log variances; 0 where it was not seen."""
     mean, covariance = belief
     memory = noise.correlation_time is not None
-    results = []
+    normalised, log_variances = [], []
     for k, sd in enumerate((noise.position, noise.position, noise.heading)):
-        shared = covariance[:, k] + covariance[:, 5 + k] if memory else covariance[:, k]
-        variance = shared[k] + shared[5 + k] if memory else shared[k] + sd**2
-        error = pose[k] - (mean[k] + mean[5 + k] if memory else mean[k])
+        shared = _row(covariance, k)
+        if memory:
+            shared = tuple(a + b for a, b in zip(shared, _row(covariance, STATES + k), strict=True))
+        variance = shared[k] + (shared[STATES + k] if memory else sd**2)
+        error = pose[k] - (mean[k] + mean[STATES + k] if memory else mean[k])
         error = wrap(error) if k == 2 else error
-        weight = jnp.where(seen, shared / variance, 0.0)
-        size = jnp.sqrt(variance)
-        mean = mean + weight * (error if limit is None else jnp.clip(error, -limit * size, limit * size))
-        covariance = covariance - weight[:, None] * shared
-        results.append((error / size, jnp.log(variance)))
-    normalised, log_variance = (jnp.where(seen, jnp.stack(part), 0.0) for part in zip(*results, strict=True))
-    return Belief(mean, covariance), (normalised, log_variance)
+        weight = jnp.where(seen, 1.0 / variance, 0.0)
+        gain = tuple(weight * part for part in shared)
+        mean = tuple(part + by * error for part, by in zip(mean, gain, strict=True))
+        covariance = tuple(
+            tuple(entry - gain[i] * part for entry, part in zip(row, shared[i:], strict=True))
+            for i, row in enumerate(covariance)
+        )
+        normalised.append(jnp.where(seen, error / jnp.sqrt(variance), 0.0))
+        log_variances.append(jnp.where(seen, jnp.log(variance), 0.0))
+    return Entries(mean, covariance), RowInnovations(tuple(normalised), tuple(log_variances))
 
 
-def predict_belief(belief: Belief, pull: PerChannel, weights: StepWeights, noise: Noise) -> Belief:
-    """The belief one step later under accelerations (2,) along and in heading."""
-    state, transition, entry = advance_with_slopes(belief.mean[:5], pull, weights)
-    entry = entry * (jnp.stack([noise.slip_along, noise.slip_heading]) / jnp.sqrt(weights.step))
+def predict_belief(belief: Entries, pull: Force, solution: Hold, noise: Noise) -> Entries:
+    """The belief one step later under accelerations along and in heading."""
+    state, slopes = advance_with_slopes(State(*belief.mean[:STATES]), pull, solution)
+    slip = [density / jnp.sqrt(solution.step) for density in (noise.slip_along, noise.slip_heading)]
+    entry = tuple(tuple(map(_times, row, slip)) for row in slopes.by_pull)
     if noise.correlation_time is None:
-        left, fresh, mean = jnp.ones(0), jnp.ones(0), state
-    else:
-        left = jnp.full(3, jnp.exp(-weights.step / noise.correlation_time))
-        fresh = (1.0 - left**2) * jnp.stack([noise.position, noise.position, noise.heading]) ** 2
-        mean = jnp.concatenate([state, left * belief.mean[5:]])
-    size = len(mean)
-    whole = jnp.zeros((size, size)).at[:5, :5].set(transition)
-    whole = whole + jnp.diag(jnp.concatenate([jnp.zeros(5), left]))
-    entry = jnp.zeros((size, 2)).at[:5].set(entry)
-    covariance = _multiply(_multiply(whole, belief.covariance), whole.T) + _multiply(entry, entry.T)
-    return Belief(mean, covariance + jnp.diag(jnp.concatenate([jnp.zeros(5), fresh])))
+        return Entries(tuple(state), _add(_sandwich(slopes.by_state, belief.covariance), _square(entry)))
+    left = jnp.exp(-solution.step / noise.correlation_time)
+    errors = tuple((None,) * (STATES + k) + (left,) + (None,) * (2 - k) for k in range(3))
+    transition = tuple((*row, None, None, None) for row in slopes.by_state) + errors
+    fresh = [(1.0 - left**2) * sd**2 for sd in (noise.position, noise.position, noise.heading)]
+    variance = tuple((own,) + (None,) * (2 - k) for k, own in enumerate(fresh))
+    slipped = tuple((*row, None, None, None) for row in _square(entry))
+    mean = *state, *(left * part for part in belief.mean[STATES:])
+    return Entries(mean, _add(_sandwich(transition, belief.covariance), slipped + variance))
 
 
-def advance_with_slopes(
-    state: StateVector, pull: PerChannel, weights: StepWeights
-) -> tuple[StateVector, StateMatrix, Array]:
-    """The state (5,) one step later, its derivatives by the state (5, 5), and by a held acceleration (5, 2)."""
-    start = jnp.concatenate([state[3:], pull])
-    gauss = weights.step * jnp.asarray(GAUSS_WEIGHTS)
-    sine, cosine = sin_cos(state[2] + jnp.sum(weights.node_turn * start, axis=1))
-    v = jnp.sum(weights.node_v * start, axis=1)
-    moved = jnp.stack([jnp.sum(gauss * v * cosine), jnp.sum(gauss * v * sine)])
-    sideways, forward = (gauss * v * sine)[:, None], (gauss * v * cosine)[:, None]
-    along_x = jnp.sum((gauss * cosine)[:, None] * weights.node_v - sideways * weights.node_turn, axis=0)
-    along_y = jnp.sum((gauss * sine)[:, None] * weights.node_v + forward * weights.node_turn, axis=0)
-    by_speed = jnp.concatenate([jnp.stack([along_x, along_y]), weights.end])
-    by_pose = jnp.eye(5, 3).at[0, 2].set(-moved[1]).at[1, 2].set(moved[0])
-    end = jnp.sum(weights.end * start, axis=1)
-    after = jnp.concatenate([state[:2] + moved, state[2:3] + end[:1], end[1:]])
-    return after, jnp.concatenate([by_pose, by_speed[:, :2]], axis=1), by_speed[:, 2:]
+def advance_with_slopes(state: State, pull: Force, solution: Hold) -> tuple[State, Slopes]:
+    """The state one step later as `drive.advance` has it, and its derivatives."""
+    start = (state.v, state.w, *pull)
+    moved: list = [None, None]
+    by_start: list[list] = [[None] * 4, [None] * 4]
+    for part, node_v, node_turn in zip(GAUSS_WEIGHTS, solution.node_v, solution.node_turn, strict=True):
+        sine, cosine = sin_cos(state.theta + weigh(node_turn, start))
+        v = weigh(node_v, start)
+        for axis, (ahead, aside) in enumerate(((cosine, -sine), (sine, cosine))):
+            share = part * solution.step
+            moved[axis] = _sum(moved[axis], share * v * ahead)
+            for k in range(4):
+                own = _sum(_times(node_v[k], share * ahead), _times(node_turn[k], share * v * aside))
+                by_start[axis][k] = _sum(by_start[axis][k], own)
+    end = solution.turn, solution.v, solution.w
+    theta, v, w = (weigh(response, start) for response in end)
+    after = State(state.x + moved[0], state.y + moved[1], state.theta + theta, v, w)
+    one = jnp.ones_like(theta)
+    by_pose = (one, None, -moved[1]), (None, one, moved[0]), (None, None, one), (None,) * 3, (None,) * 3
+    by_start.extend(map(list, end))
+    by_state = tuple((*pose, *speeds[:2]) for pose, speeds in zip(by_pose, by_start, strict=True))
+    return after, Slopes(by_state, tuple(tuple(speeds[2:]) for speeds in by_start))
 
 
-def _multiply(left: Array, right: Array) -> Array:
-    """left @ right of two matrices in plain arithmetic, which maps over trials."""
-    return jnp.sum(left[:, :, None] * right[None, :, :], axis=1)
+def _row(covariance: Rows, i: int) -> tuple:
+    """Row i of a symmetric matrix that is given from the diagonal on."""
+    return tuple(covariance[min(i, j)][abs(i - j)] for j in range(len(covariance)))
+
+
+def _sandwich(left: Rows, covariance: Rows) -> Rows:
+    """L P L' from the diagonal on."""
+    columns = [_row(covariance, j) for j in range(len(covariance))]
+    half = [tuple(_dot(row, column) for column in columns) for row in left]
+    return tuple(tuple(_dot(row, other) for other in left[i:]) for i, row in enumerate(half))
+
+
+def _square(rows: Rows) -> Rows:
+    """A A' from the diagonal on."""
+    return tuple(tuple(_dot(row, other) for other in rows[i:]) for i, row in enumerate(rows))
+
+
+def _add(one: Rows, other: Rows) -> Rows:
+    return tuple(tuple(map(_sum, a, b)) for a, b in zip(one, other, strict=True))
+
+
+def _dot(row: tuple, other: tuple) -> Entry:
+    total = None
+    for product in map(_times, row, other):
+        total = _sum(total, product)
+    return total
+
+
+def _sum(a: Entry, b: Entry) -> Entry:
+    return b if a is None else a if b is None else a + b
+
+
+def _times(a: Entry, b: Entry) -> Entry:
+    return None if a is None or b is None else a * b

@@ -4,11 +4,19 @@ import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array, Pose, PoseMatrix, PoseRows, PoseVector, State, StateVector
-from jaxident.estimation.poses.filter import Belief, first_belief, predict_belief, step_weights, take_in
+from jaxident.estimation.poses.filter import (
+    Belief,
+    Entries,
+    belief_of,
+    entries_of,
+    first_belief,
+    predict_belief,
+    take_in,
+)
 from jaxident.estimation.poses.parameters import Robot
 from jaxident.estimation.poses.runs import Runs
 from jaxident.robot.dead_zone import effective_command
-from jaxident.robot.drive import force, hold
+from jaxident.robot.drive import Force, force, hold
 from jaxident.robot.noise import Noise
 
 
@@ -19,22 +27,21 @@ def replicate_run(robot: Robot, start: StateVector, run: Runs, normalised: PoseR
     pose = expected pose + L z, L L' the covariance of the innovation. 0 where no pose was seen.
     """
     solution = hold(robot.drive, run.step if jnp.ndim(run.step) == 0 else run.step[:-1])
-    weights = step_weights(solution)
     even = jnp.ndim(solution.step) == 0
     pull = force(robot.drive, effective_command(run.command, jnp.stack(robot.dead_zone)))
-    pulls = jnp.stack(pull, axis=-1)[:-1]
 
-    def show(belief: Belief, z: Array, seen: Array) -> tuple[Belief, Array]:
-        pose = jnp.where(seen, _pose(belief, z, robot.noise), 0.0)
-        return take_in(belief, pose, seen, robot.noise)[0], pose
+    def show(belief: Entries, z: Array, seen: Array) -> tuple[Entries, Array]:
+        pose = jnp.where(seen, _pose(belief_of(belief), z, robot.noise), 0.0)
+        return take_in(belief, Pose(*pose), seen, robot.noise)[0], pose
 
     def body(belief, now):
         pull, own, z, seen = now
         belief, pose = show(belief, z, seen)
-        return predict_belief(belief, pull, weights if even else own, robot.noise), pose
+        return predict_belief(belief, pull, solution if even else own, robot.noise), pose
 
-    begin = first_belief(State(*start), robot.noise)
-    rows = pulls, None if even else weights, normalised.T[:-1], run.seen[:-1]
+    begin = entries_of(first_belief(State(*start), robot.noise))
+    pulls = Force(*(part[:-1] for part in pull))
+    rows = pulls, None if even else solution, normalised.T[:-1], run.seen[:-1]
     belief, poses = jax.lax.scan(body, begin, rows)
     _, last = show(belief, normalised[:, -1], run.seen[-1])
     return Pose(*jnp.concatenate([poses, last[None]]).T)

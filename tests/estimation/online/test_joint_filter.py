@@ -110,7 +110,7 @@ def test_known_parameters_make_it_the_plain_filter(memory):
     held = hold(drive, jnp.asarray(PERIOD))
     plain, (normalised, _) = jax.jit(scan_filter, static_argnums=3)(held, pull, start_belief, noise, blind)
     state, (_, info) = jax.jit(last)(state, jax.tree.map(lambda c: c[1:], rows))
-    np.testing.assert_allclose(np.stack(info.error, axis=1), normalised[1:], rtol=1e-5, atol=1e-5)
+    np.testing.assert_allclose(np.stack(info.error), normalised[:, 1:], rtol=1e-5, atol=1e-5)
     np.testing.assert_allclose(state.belief.mean[:size], plain.mean, rtol=1e-5, atol=1e-7)
 
 
