@@ -12,6 +12,9 @@ FLAGS = {
 }
 """What XLA is asked for, unless XLA_FLAGS says something else of it; `start_jax` says why."""
 
+SHORTEST_COMPILATION = 0.03
+"""Seconds of compilation from which on code is kept: about what reading it takes. No other number was tried but 0.2, of
+which `identify` compiled ten small programs anew, 0.4 s in all."""
 TRIM_THRESHOLD, TOP_PAD, MMAP_THRESHOLD = -1, -2, -3
 KEPT_MEMORY = {MMAP_THRESHOLD: 32 << 20, TRIM_THRESHOLD: 256 << 20, TOP_PAD: 64 << 20}
 """Names and values of glibc's mallopt(3) [bytes]: the largest threshold that every version takes, and one heap of a
@@ -29,8 +32,8 @@ def start_jax(*, cache: bool = True) -> None:
     * Both go into XLA_FLAGS, which XLA reads once, at the first computation; called later, they have no effect.
     * Under glibc, up to 256 MB of freed memory stay with the process. Without this every array above some megabytes is
       fetched from the system page by page and given back: a third of the time of a simulation of many trials.
-    * With `cache`, compiled code is kept between runs in the user's cache folder; JAXIDENT_CACHE moves it, set but
-      empty turns it off.
+    * With `cache`, compiled code and traced programs (`programs`) are kept between runs in the user's cache folder;
+      JAXIDENT_CACHE moves it, set but empty turns it off.
     """
     jax.config.update("jax_enable_x64", True)
     flags = os.environ.get("XLA_FLAGS", "")
@@ -40,7 +43,7 @@ def start_jax(*, cache: bool = True) -> None:
     folder = _cache_folder() if cache else ""
     if folder and _usable(folder):
         jax.config.update("jax_compilation_cache_dir", folder)
-        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.2)
+        jax.config.update("jax_persistent_cache_min_compile_time_secs", SHORTEST_COMPILATION)
         jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)
 
 

@@ -10,7 +10,19 @@ import pytest
 
 PACKAGE = pathlib.Path(__file__).resolve().parents[1] / "jaxident"
 
-GROUND = ("array_types", "errors", "numerics", "origin", "rules", "columns", "log", "start", "parallel", "progress")
+GROUND = (
+    "array_types",
+    "errors",
+    "numerics",
+    "origin",
+    "rules",
+    "columns",
+    "log",
+    "start",
+    "parallel",
+    "programs",
+    "progress",
+)
 FLOORS = (
     ("ground",),
     ("robot",),

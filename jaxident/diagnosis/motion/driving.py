@@ -1,16 +1,16 @@
 """What drives the wheels under many vectors: each different push is computed once, side by side on all cores."""
 
-import jax
 import numpy as np
 
-from jaxident.array_types import Array
+from jaxident.array_types import Array, Wheels
 from jaxident.diagnosis.motion.paths import push_of
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.coordinates import BY_DRIVE, NOMINAL, PLACES
 from jaxident.effects.fast_input import PUSHING, Push
 from jaxident.parallel import in_parallel
+from jaxident.programs import kept_program
 
-_pushed = jax.jit(push_of)
+_pushed = kept_program(Windows, Wheels, Push)(push_of)
 _BY_DRIVE = [PLACES[pair] for pair in sorted(BY_DRIVE)]
 _PUSHING = [6, 7, *(place for (name, _), place in PLACES.items() if name in PUSHING)]
 

@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxident.array_types import Array
+from jaxident.array_types import Array, State, Wheels
 from jaxident.diagnosis.motion.driving import pushes_of
 from jaxident.diagnosis.motion.paths import move, residuals
 from jaxident.diagnosis.motion.responses import answer_to_start
@@ -19,7 +19,9 @@ from jaxident.diagnosis.motion.rims import rim_speeds
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.coordinates import limits, sizes
 from jaxident.effects.discovered import Laws
+from jaxident.effects.fast_input import Push
 from jaxident.parallel import in_parallel
+from jaxident.programs import kept_program
 
 START_STATES = 5
 PART = 1e-5
@@ -47,7 +49,8 @@ class Gram(NamedTuple):
     solve: Any
 
 
-_moved, _tracked = jax.jit(residuals), jax.jit(move)
+_OF_MOTION = Push, Windows, Wheels, Laws
+_moved, _tracked = kept_program(*_OF_MOTION)(residuals), kept_program(*_OF_MOTION, State)(move)
 
 
 def follow(vectors: Array, starts: Array, windows: Windows, laws: Laws | None = None) -> np.ndarray:

@@ -20,6 +20,7 @@ from jaxident.estimation.increments.observations import blind, repeats
 from jaxident.log import Log
 from jaxident.numerics import wrap
 from jaxident.parallel import in_parallel
+from jaxident.programs import kept_program
 from jaxident.robot.model import Model
 from jaxident.robot.noise import Noise
 
@@ -113,7 +114,7 @@ def _filtered(
     return Run(*(np.where(lost, new, old) for new, old in zip(again, found, strict=True))), other, lost
 
 
-_run_block = jax.jit(filter_and_run)
+_run_block = kept_program(Laws, Noise, Stretch, Run)(filter_and_run)
 
 
 def _in_blocks(vector: Array, laws: Laws | None, noise: Noise, lost: float | None, stretch: Stretch, first: int) -> Run:

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import jax
 import jax.numpy as jnp
 
-from jaxident.array_types import Array
+from jaxident.array_types import Array, Pose, Wheels
 from jaxident.estimation.poses.covariance import posterior_at
 from jaxident.estimation.poses.curvature import Point, local_at
 from jaxident.estimation.poses.likelihood import Innovations, innovations
@@ -17,13 +17,16 @@ from jaxident.estimation.poses.scoring import Search, search_from, with_prior
 from jaxident.estimation.poses.starter import Start, channels, first_estimate, start_states
 from jaxident.estimation.poses.wheel_likelihood import first_sensor
 from jaxident.numerics import in_blocks
+from jaxident.programs import kept_program
 from jaxident.robot.drive import Physical
 from jaxident.robot.noise import Noise
+from jaxident.robot.wheel_sensor import WheelSensor
 
 MOST_STEPS = 100
 BLOCK = 4
 """Trials of a batch whose starters run at once: the paths of more leave the second-level cache."""
 WHITE = Law()
+OF_RUNS = Runs, Wheels, Pose
 
 
 class Fit(NamedTuple):
@@ -54,7 +57,7 @@ class Beginning(NamedTuple):
     starts: Any
 
 
-@jax.jit
+@kept_program(Beginning, Start, *OF_RUNS)
 def begin(runs: Runs, d_max: Array) -> Beginning:
     """The starter's estimate on windows of the runs (runs, rows)."""
     return in_blocks(_begin, BLOCK)(runs, jnp.asarray(d_max))
@@ -90,7 +93,7 @@ def fit_runs(runs: Runs, d_max: Array, law: Law = WHITE, prior: Prior | None = N
     return fit_from(begin(runs, d_max), runs, d_max, law, prior_of(runs) if prior is None else prior)
 
 
-@partial(jax.jit, static_argnames=("law",))
+@kept_program(Beginning, Start, *OF_RUNS, Prior, Fit, Robot, Physical, Noise, WheelSensor, Innovations, static=("law",))
 def fit_from(beginning: Beginning, runs: Runs, d_max: Array, law: Law, prior: Prior) -> Fit:
     """The estimate by a search from a given beginning."""
     search = search_from(first_point(beginning, runs, law), runs, law, d_max, MOST_STEPS, prior)
