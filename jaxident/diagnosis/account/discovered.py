@@ -1,6 +1,7 @@
 """Which discovered curves the judging runs confirm, and how much of the error each takes away there."""
 
 import dataclasses
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from jaxident.array_types import Array
@@ -58,26 +59,33 @@ class Confirmed(NamedTuple):
 def confirm(prepared: Prepared, finding: Finding, direct: dict, seed: int, plain: Corrected) -> Confirmed | None:
     """The most curves, in the order in which they were found, that the judging rows confirm; None if none.
 
-    A curve is confirmed if, beside those confirmed before it, it takes error away, 95 % surely. Two halves of one law
-    may do so together only; the second then takes some away beside the first. The judging rows accept or refuse: they
-    change no number of a curve. plain: the corrected model without curves.
+    The judging rows accept or refuse (`confirms`): they change no number of a curve. plain: the corrected model without
+    curves.
     """
     steps: list[Judged] = []
     found, confirmed = None, 0
     for bending in discover(finding):
         steps = steps or [judge_model(_plain(plain.model), prepared)]
         whole, draws = sized_corrected(prepared, beside(finding, bending), direct, seed, bending)
-        unit = deviations(whole.law) ** 2
         steps = [*steps, judge_model(_plain(whole.model), prepared)]
-        (share, p_value), (more, _) = (
-            taken(before.error, steps[-1].error, steps[0].error ** 2 / unit, unit, seed)
-            for before in (steps[confirmed], steps[-2])
-        )
-        if min(share, more) > 0.0 and p_value < LOW:
+        if confirms([step.error for step in steps], confirmed, deviations(whole.law) ** 2, seed):
             confirmed = len(steps) - 1
             named = corrected_of(prepared, finding, whole.law, direct)
             found = Confirmed(bending, whole, named, draws, steps)
     return found
+
+
+def confirms(errors: Sequence[Array], confirmed: int, unit: Array, seed: int) -> bool:
+    """Whether the last of some curves is confirmed. errors (starts, 3) without curves, with the first, with the first
+    two and so on; confirmed: how many of them are; unit (3,): the camera's variances.
+
+    Beside those that are confirmed it takes error away, 95 % surely. Two halves of one law may do so together only: the
+    second then takes some away beside the first.
+    """
+    (share, p_value), (more, _) = (
+        taken(before, errors[-1], errors[0] ** 2 / unit, unit, seed) for before in (errors[confirmed], errors[-2])
+    )
+    return min(share, more) > 0.0 and p_value < LOW
 
 
 def each_law(prepared: Prepared, found: Confirmed, total: Array, unit: Array, seed: int) -> tuple[Shown, ...]:
