@@ -39,18 +39,22 @@ def kept_program(*tuples: type, static: tuple[str, ...] = ()) -> Callable[[Calla
 
         @functools.wraps(function)
         def call(*args: Any, **kwargs: Any) -> Any:
-            named = signature.bind(*args, **kwargs).arguments
-            own = {name: named.pop(name) for name in static if name in named}
-            leaves, tree = jax.tree.flatten(named)
+            own = {}
+            if static:
+                kwargs = signature.bind(*args, **kwargs).arguments
+                own, args = {name: kwargs.pop(name) for name in static if name in kwargs}, ()
+            leaves, tree = jax.tree.flatten((args, kwargs))
             folder = jax.config.jax_compilation_cache_dir  # type: ignore[attr-defined]
             if not folder or any(isinstance(leaf, jax.core.Tracer) for leaf in leaves):
-                return compiled(*args, **kwargs)
+                return compiled(*args, **kwargs, **own)
             key = folder, tuple(own.items()), tree, tuple(map(_shape, leaves))
-            if key not in programs:
+            program = programs.get(key)
+            if program is None:
                 name = f"{function.__module__}.{function.__qualname__}"
                 path = pathlib.Path(folder) / f"program-{_digest(name, *map(str, key)).hex()}"
-                programs[key] = _read(path) or _made(functools.partial(compiled, **own), named, path)
-            return programs[key](**named)
+                program = _read(path) or _made(functools.partial(compiled, **own), args, kwargs, path)
+                programs[key] = program
+            return program(*args, **kwargs)
 
         call._cache_size = lambda: len(programs) + compiled._cache_size()  # type: ignore[attr-defined]
         return call
@@ -59,15 +63,17 @@ def kept_program(*tuples: type, static: tuple[str, ...] = ()) -> Callable[[Calla
 
 
 def _shape(leaf: Any) -> tuple:
-    leaf = leaf if hasattr(leaf, "dtype") else jax.numpy.asarray(leaf)
-    return leaf.shape, str(leaf.dtype)
+    try:
+        return leaf.shape, leaf.dtype
+    except AttributeError:  # a number
+        return jax.numpy.shape(leaf), jax.numpy.result_type(leaf)
 
 
-def _made(function: Callable, arguments: dict[str, Any], path: pathlib.Path) -> Callable:
+def _made(function: Callable, args: tuple, kwargs: dict[str, Any], path: pathlib.Path) -> Callable:
     """The program of a function at some arguments, kept in a file where that is possible."""
     program = jax.jit(function)
     try:
-        exported = jax.export.export(program)(**arguments)
+        exported = jax.export.export(program)(*args, **kwargs)
     except ValueError:  # it calls a library in a way that may change
         return program
     _write(path, bytes(exported.serialize()))

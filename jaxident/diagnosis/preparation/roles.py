@@ -7,7 +7,7 @@ import numpy as np
 
 from jaxident.diagnosis.motion.windows import Piece
 from jaxident.effects.fast_input import RUN_UP
-from jaxident.log import Log
+from jaxident.log import Log, run_begins
 
 SHARED_BY = 3
 """Every third run judges, the second first, so that both purposes see early and late."""
@@ -15,6 +15,10 @@ LONGEST = 1000
 """Rows of a piece that is fitted: a scan over the commands of one longer run takes as long as that over many."""
 PARTS = 36
 """Parts at most that one or two runs are cut into."""
+MOST_FITTED, MOST_JUDGED = 16_000, 8_000
+"""Rows that fit, and rows that judge, at most: cost grows with both. Logs of up to 24,000 rows are used whole."""
+SHORT = 400
+"""Rows of the pieces among which those that tell most are chosen."""
 
 
 class Roles(NamedTuple):
@@ -26,7 +30,7 @@ class Roles(NamedTuple):
 
 def split(log: Log, rows: int) -> Roles:
     """Every third run judges; of one or two runs, every third part of them, of two windows (of `rows` rows) at
-    least."""
+    least. Of a log of many rows those pieces have a role whose commands tell most."""
     runs = log.runs()
     step = float(np.median(np.concatenate([np.diff(run.t) for run in runs])))
     lead = int(np.ceil(RUN_UP / step))
@@ -39,7 +43,37 @@ def split(log: Log, rows: int) -> Roles:
     fitted = [part for part, judging in zip(parts, judges, strict=True) if not judging]
     size = max(rows, LONGEST // rows * rows)
     fit = [_piece(*short, lead) for part in fitted for short in _parts(*part, size)]
-    return Roles(fit, [_piece(*part, lead) for part in itertools.compress(parts, judges)])
+    judge = [_piece(*part, lead) for part in itertools.compress(parts, judges)]
+    return Roles(_most_telling(log, fit, MOST_FITTED, rows, lead), _most_telling(log, judge, MOST_JUDGED, rows, lead))
+
+
+def _most_telling(log: Log, pieces: list[Piece], most: int, rows: int, lead: int) -> list[Piece]:
+    """The pieces, or short ones of them that have `most` rows together, at even steps of the information that the
+    commands have gathered since the log began: many where the robot moves anyhow, few where it stands."""
+    if sum(piece.last - piece.first for piece in pieces) <= most:
+        return pieces
+    size, told = max(rows, SHORT // rows * rows), np.concatenate([[0.0], np.cumsum(leverages(log))])
+    parts = [part for piece in pieces for part in _parts(piece.run, piece.first, piece.last, size)]
+    short = [_piece(*part, lead) for part in parts]
+    begins = run_begins(log)
+    own = [told[begins[piece.run] + piece.last] - told[begins[piece.run] + piece.first] for piece in short]
+    gathered = np.cumsum(own)
+    steps = (np.arange(most // size) + 0.5) * gathered[-1] / (most // size)
+    return [short[k] for k in np.unique(np.searchsorted(gathered, steps))]
+
+
+def leverages(log: Log) -> np.ndarray:
+    """How much each row's commands tell beside those of all others (rows,), between 0 and 1; 0 where no pose was seen.
+
+    psi' (sum of psi psi')^-1 psi, psi both commands and their changes since the row before: what a linear model would
+    learn there (Belsley, Kuh and Welsch 1980, section 2.1). Poses have no say, so that noise has none.
+    """
+    command = np.nan_to_num(np.stack(log.command, axis=1))
+    change = np.diff(command, axis=0, prepend=command[:1])
+    change[run_begins(log)] = 0.0
+    seen = np.isfinite(np.stack(log.pose)).all(axis=0)
+    regressors = np.where(seen[:, None], np.concatenate([command, change], axis=1), 0.0)
+    return np.einsum("ti,ij,tj->t", regressors, np.linalg.pinv(regressors.T @ regressors), regressors)
 
 
 def _parts(run: int, first: int, last: int, size: int) -> list[tuple[int, int, int]]:
