@@ -112,9 +112,10 @@ def _told(found) -> list[str]:
     from jaxident.report.discovered import sentence
     from jaxident.report.lead import refusal
     from jaxident.report.motor_or_ground import wheels_line
+    from jaxident.report.stretches import left_out
     from jaxident.report.words import plain_text
 
-    lines = account_lines(found.account)
+    lines = [*([told] if (told := left_out(found)) else []), *account_lines(found.account)]
     lines.append(f"verdict: {SENTENCE[found.verdict].format(effects=' and '.join(found.selected))}")
     lines += [f"discovered: {plain_text(sentence(shown))}" for shown in found.discovered]
     lines += [f"refused: {told}"] if (told := refusal(found)) else []

@@ -12,6 +12,7 @@ from jaxident.diagnosis.account.odometry import Odometry
 from jaxident.diagnosis.account.where import OF_COMMANDS, Region
 from jaxident.diagnosis.detectability import Replay
 from jaxident.diagnosis.diagnose import Diagnosis
+from jaxident.diagnosis.preparation.prepare import Prepared
 from jaxident.effects.catalogue import BY_KIND, CATALOGUE
 from jaxident.effects.law_kinds import HEATS, knots_by_signal
 
@@ -24,6 +25,7 @@ def diagnosis_to_dict(found: Diagnosis) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "verdict": found.verdict,
+        "rows": _served(found.prepared),
         "probability": {
             "gap": judgement.gap,
             "unexplained": judgement.unexplained,
@@ -50,6 +52,12 @@ def diagnosis_to_dict(found: Diagnosis) -> dict[str, Any]:
         "suspicions": list(found.suspicions),
         "next": found.next,
     }
+
+
+def _served(prepared: Prepared) -> dict[str, int]:
+    """How many rows the log has, and how many of them fitted and judged."""
+    fitted, judged = prepared.served
+    return {"log": len(prepared.log.t), "fitted": fitted, "judged": judged}
 
 
 def _wheels(told: Odometry) -> dict[str, Any]:

@@ -74,8 +74,16 @@ def served(found: Diagnosis) -> Section:
         (k + 1, len(run.t), float(run.t[-1] - run.t[0]), _stretches(naming == k), _stretches(judging == k))
         for k, run in enumerate(found.prepared.log.runs())
     ]
-    table = Table(("run", "rows", "seconds", "fits and names", "judges"), rows, SERVED)
+    table = Table(("run", "rows", "seconds", "fits and names", "judges"), rows, f"{SERVED} {left_out(found)}".strip())
     return Section("Which run served what", [table], folded=True)
+
+
+def left_out(found: Diagnosis) -> str:
+    """How much of a long log was used, in a sentence; nothing where that is all of it."""
+    rows, (fit, judge) = len(found.prepared.log.t), found.prepared.served
+    if fit + judge >= rows:
+        return ""
+    return f"Of {rows:,} rows {fit:,} fit and {judge:,} judge: those whose commands tell most."
 
 
 SERVED = (

@@ -10,7 +10,15 @@ from jaxident.diagnosis.causes.finding import find_effects
 from jaxident.diagnosis.motion.paths import track
 from jaxident.diagnosis.motion.windows import cut
 from jaxident.diagnosis.preparation.prepare import BURN, FEWEST, judging_starts, prepare, shows_start
-from jaxident.diagnosis.preparation.roles import LONGEST, PARTS, split
+from jaxident.diagnosis.preparation.roles import (
+    LONGEST,
+    MOST_FITTED,
+    MOST_JUDGED,
+    PARTS,
+    SHORT,
+    leverages,
+    split,
+)
 from jaxident.effects.coordinates import PLACES, neutral_vector, nominal_vector
 from jaxident.effects.simulate import simulate
 from jaxident.errors import InputError
@@ -46,6 +54,52 @@ def test_every_row_has_one_role_and_a_third_judges(rows, runs):
     assert len(roles.judge) <= max(PARTS, runs)
     if runs >= 3:
         assert {p.run for p in roles.judge} == set(range(1, runs, 3))
+
+
+def driven(rows, runs, share, seed=0):
+    """Logs of a robot that is driven over a share of the time, in spells of 1500 rows, and stands else; where it is."""
+    log, rng = blank(rows, runs), np.random.default_rng(seed)
+    count = rows * runs
+    moving = np.repeat(rng.random(count // 1500 + 1) < share, 1500)[:count]
+    commands = np.repeat(rng.uniform(-1.0, 1.0, (count // 10 + 1, 2)), 10, axis=0)[:count]
+    u = np.where(moving[:, None], commands, 0.0)
+    return log._replace(u_r=u[:, 0], u_l=u[:, 1]), moving
+
+
+@pytest.mark.parametrize(("rows", "runs"), [(300_000, 1), (3_000, 100)])
+def test_of_a_long_log_parts_that_tell_most_have_a_role(rows, runs):
+    """The robot is driven a fifth of the time: nearly all rows that are used are from there, early and late ones."""
+    log, moving = driven(rows, runs, 0.2)
+    fit, judge = (rows_of(log, pieces) for pieces in split(log, ROWS))
+    assert not set(fit) & set(judge)
+    assert 0.6 * MOST_FITTED < len(fit) <= MOST_FITTED
+    assert 0.5 * MOST_JUDGED < len(judge) <= MOST_JUDGED
+    for part in (fit, judge):
+        assert np.mean(moving[part]) > 0.8
+        early, late = np.quantile(part, [0.1, 0.9]) / len(moving)
+        assert early < 0.35
+        assert late > 0.75
+
+
+def test_where_all_rows_tell_alike_parts_lie_evenly():
+    log, _ = driven(90_000, 1, 1.0)
+    fit = split(log, ROWS).fit
+    apart = np.diff([piece.first for piece in fit])
+    assert len(fit) * SHORT == MOST_FITTED
+    assert max(apart) < 3 * 90_000 / len(fit)
+
+
+def test_leverages_are_those_of_a_least_squares_fit():
+    """The diagonal of the matrix that takes measurements to fitted values; 0 where the camera was blind."""
+    log, _ = driven(3000, 2, 0.5)
+    blind = np.arange(6000) % 7 == 0
+    told = leverages(log._replace(x=np.where(blind, np.nan, log.x)))
+    command = np.stack([log.u_r, log.u_l], axis=1)
+    change = np.diff(command, axis=0, prepend=command[:1])
+    change[3000] = 0.0
+    basis, _ = np.linalg.qr(np.concatenate([command, change], axis=1)[~blind])
+    assert np.all(told[blind] == 0.0)
+    np.testing.assert_allclose(told[~blind], np.sum(basis**2, axis=1), atol=1e-12)
 
 
 @pytest.mark.slow

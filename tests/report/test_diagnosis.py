@@ -22,7 +22,7 @@ from jaxident.report.causes import BESIDE
 from jaxident.report.diagnosis import diagnosis_page
 from jaxident.report.lead import lead
 from jaxident.report.motor_or_ground import wheels_line
-from jaxident.report.stretches import SHOWN, draw_stretches, worst_starts, worst_stretches
+from jaxident.report.stretches import SHOWN, draw_stretches, left_out, worst_starts, worst_stretches
 from jaxident.report.words import EFFECTS, LOOKS, SITES, chance, measured, number, parameters, percent, plain, together
 from jaxident.robot.model import Discovered
 from jaxident.robot.wheel_sensor import WheelSensor
@@ -321,6 +321,19 @@ def test_no_stretch_is_drawn_where_none_is_left():
 def test_the_page_says_which_run_served_what():
     (table,) = tables(section(page_of("effects"), "Which run served what"))
     assert [row[-2:] for row in table.rows] == [("30", "–"), ("–", "30")]
+    assert "tell most" not in table.caption
+
+
+def test_the_page_says_how_much_of_a_long_log_was_used():
+    found = made_up("effects")
+    rows = len(found.prepared.log.t)
+    assert left_out(found) == ""
+    found = found._replace(prepared=found.prepared._replace(served=(500, 300)))
+    sentence = f"Of {rows:,} rows 500 fit and 300 judge: those whose commands tell most."
+    assert left_out(found) == sentence
+    (table,) = tables(section(diagnosis_page(found, "runs"), "Which run served what"))
+    assert sentence in table.caption
+    assert diagnosis_to_dict(found)["rows"] == {"log": rows, "fitted": 500, "judged": 300}
 
 
 def with_wheels(found):

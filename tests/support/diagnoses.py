@@ -67,7 +67,7 @@ def made_up(verdict: str, *, given: bool = False) -> Diagnosis:
         REPLAY, "Record a longer <run> & more.",
         model, _with_effects(model, selected), shrinks,
         Prepared(_log(), LARGEST, _NOTHING, _starts(1), _starts(0), _NOTHING, ROWS, 1.0,
-                 Frames(_NOTHING, _NOTHING), _NOTHING),
+                 Frames(_NOTHING, _NOTHING), _NOTHING, served=(COUNT * ROWS + 1, COUNT * ROWS + 1)),
         _finding(selected, gap, verdict),
     )  # fmt: skip
 

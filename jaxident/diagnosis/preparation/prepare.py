@@ -18,7 +18,7 @@ from jaxident.diagnosis.preparation.pose_screening import (
     frames_of,
     has_outliers,
 )
-from jaxident.diagnosis.preparation.roles import split
+from jaxident.diagnosis.preparation.roles import rows_of, split
 from jaxident.effects.coordinates import neutral_vector
 from jaxident.errors import InputError
 from jaxident.estimation.ahead.stretches import Starts
@@ -47,7 +47,8 @@ class Prepared(NamedTuple):
     naming: the same of the rows that fit, in the log `fitted` of these alone.
     nominal: the nominal fit. lost: the share of commands that never arrived, and the gain of
     saying so; the windows' commands are then those that did, those `sent` (rows of a piece, pieces, 2) are kept.
-    told (10,): the coordinates of a nominal model that was given, None without.
+    told (10,): the coordinates of a nominal model that was given, None without. served: rows that fit, and rows that
+    judge; of a long log they are not all (`roles`).
     """
 
     log: Log
@@ -63,6 +64,7 @@ class Prepared(NamedTuple):
     lost: tuple[float, float] = (0.0, 0.0)
     sent: Any = None
     told: Any = None
+    served: tuple[int, int] = (0, 0)
 
 
 def prepare(
@@ -97,7 +99,7 @@ def prepare(
     vector = neutral_vector(starting_point(fitted, pieces) if nominal is None else nominal)
     first = rough_fit(windows, vector, law)
     found = Prepared(given, largest, windows, judging, naming, only(given, pieces), rows, horizon,
-                     Frames(frozen, frozen), first, told=nominal)  # fmt: skip
+                     Frames(frozen, frozen), first, told=nominal, served=rows_of(roles))  # fmt: skip
     if law is not None:
         return found
     outlying, windows, first = without_outliers(fitted, windows, first, pieces)

@@ -47,10 +47,16 @@ def split(log: Log, rows: int) -> Roles:
     return Roles(_most_telling(log, fit, MOST_FITTED, rows, lead), _most_telling(log, judge, MOST_JUDGED, rows, lead))
 
 
+def rows_of(roles: Roles) -> tuple[int, int]:
+    """How many rows fit, and how many judge."""
+    fit, judge = (sum(piece.last - piece.first for piece in pieces) for pieces in roles)
+    return fit, judge
+
+
 def _most_telling(log: Log, pieces: list[Piece], most: int, rows: int, lead: int) -> list[Piece]:
     """The pieces, or short ones of them that have `most` rows together, at even steps of the information that the
     commands have gathered since the log began: many where the robot moves anyhow, few where it stands."""
-    if sum(piece.last - piece.first for piece in pieces) <= most:
+    if rows_of(Roles(pieces, []))[0] <= most:
         return pieces
     size, told = max(rows, SHORT // rows * rows), np.concatenate([[0.0], np.cumsum(leverages(log))])
     parts = [part for piece in pieces for part in _parts(piece.run, piece.first, piece.last, size)]
