@@ -12,8 +12,6 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import lineax
-import optimistix
 
 from jaxident.array_types import Array, Increment, PerChannel, SearchPoint
 from jaxident.estimation.increments.input_forms import Reading, free_run, one_step, reading_of, usable
@@ -182,6 +180,8 @@ def _refine(cost: Cost, reading: Reading, d_max: Array, start: SearchPoint, held
     held (2,): dead zones that stay. The residuals and their slopes go to the search as four numbers a channel with
     the same inner products.
     """
+    import lineax  # here, for both take 0.3 s, and maximum likelihood has no use for them
+    import optimistix
 
     def triangles(point):
         return jax.vmap(triangle)(cost.left(point).products / cost.weight[:, None, None] ** 2)
