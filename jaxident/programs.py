@@ -5,6 +5,7 @@ code. For a fit under slip this takes 3 s, and the fit itself 0.6 s. A kept prog
 (`jax.export`) by the first process, and read by all later ones.
 """
 
+import contextlib
 import functools
 import hashlib
 import inspect
@@ -25,8 +26,9 @@ _named: set[type] = set()
 def kept_program(*tuples: type, static: tuple[str, ...] = ()) -> Callable[[Callable], Callable]:
     """Like `jax.jit` with some `static` arguments, for a function that users wait for; a decorator.
 
-    tuples: every NamedTuple that its arguments and results hold; a file names them. Within another traced function,
-    without a cache folder, and where the program calls what may change with the version of JAX, it is plain `jax.jit`.
+    tuples: every NamedTuple that its arguments and results hold, for a file names them; one that is left out raises
+    ValueError at the first call. Within another traced function, without a cache folder, and where the program calls
+    what may change with the version of JAX, it is plain `jax.jit`.
     """
     for one in tuples:
         if one not in _named:
@@ -93,12 +95,14 @@ def _read(path: pathlib.Path) -> Callable | None:
 
 def _write(path: pathlib.Path, data: bytes) -> None:
     """Write a file as a whole or not at all; a folder that takes nothing more is no reason to stop."""
-    try:
-        with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
-            file.write(hashlib.sha256(data).digest() + data)
-        os.replace(file.name, path)
-    except OSError:
-        pass
+    with contextlib.suppress(OSError):
+        number, name = tempfile.mkstemp(dir=path.parent)
+        try:
+            with os.fdopen(number, "wb") as file:
+                file.write(hashlib.sha256(data).digest() + data)
+            os.replace(name, path)
+        except OSError:
+            os.unlink(name)
 
 
 def _digest(*parts: str) -> bytes:

@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import pytest
 
+from jaxident import programs
 from jaxident.programs import kept_program
 
 
@@ -85,6 +86,21 @@ def test_a_folder_that_takes_nothing_costs_only_time(folder):
     assert traces.count == 2
     jax.config.update("jax_compilation_cache_dir", None)
     assert traces.program()(PAIR, 3).a.tolist() == [2.0, 9.0]
+
+
+def test_what_cannot_be_put_in_its_place_leaves_nothing_behind(folder):
+    (folder / "program").mkdir()
+    programs._write(folder / "program", b"data")
+    assert [path.name for path in folder.iterdir()] == ["program"]
+
+
+class Unlisted(NamedTuple):
+    a: Any
+
+
+def test_a_tuple_that_is_not_listed_is_told():
+    with pytest.raises(ValueError, match="Unlisted"):
+        kept_program(Pair)(lambda pair: Unlisted(pair.a))(PAIR)
 
 
 def test_within_another_program_it_is_a_plain_function(folder):

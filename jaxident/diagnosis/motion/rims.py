@@ -12,14 +12,16 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxident.array_types import Array
+from jaxident.array_types import Array, Wheels
 from jaxident.diagnosis.motion.driving import pushes_of
 from jaxident.diagnosis.motion.paths import rolled
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.coordinates import POSES_ONLY, of_wheels
 from jaxident.effects.discovered import Laws
+from jaxident.effects.fast_input import Push
 from jaxident.estimation.poses.wheel_colour import samples_each
 from jaxident.parallel import in_parallel
+from jaxident.programs import kept_program
 
 SAME = 1e-6
 """Part of a direction's length below which it is a copy of another one."""
@@ -58,7 +60,7 @@ def untold(windows: Windows) -> frozenset[str]:
     return POSES_ONLY if windows.wheels is None else frozenset()
 
 
-_rolled = jax.jit(rolled)
+_rolled = kept_program(Push, Windows, Wheels, Laws)(rolled)
 
 
 def rim_speeds(vectors: Array, starts: Array, windows: Windows, laws: Laws | None = None) -> np.ndarray:

@@ -16,9 +16,10 @@ LONGEST = 1000
 PARTS = 36
 """Parts at most that one or two runs are cut into."""
 MOST_FITTED, MOST_JUDGED = 16_000, 8_000
-"""Rows that fit, and rows that judge, at most: cost grows with both. Logs of up to 24,000 rows are used whole."""
+"""Rows that fit, and rows that judge, at most: cost grows with both. With them a log of 1,000,000 rows takes as long as
+one of 22,200 (`experiments/speed.md`); no other numbers were tried. Logs of up to some 21,000 rows are used whole."""
 SHORT = 400
-"""Rows of the pieces among which those that tell most are chosen."""
+"""Rows of the pieces among which those that tell most are chosen. No other number was tried."""
 
 
 class Roles(NamedTuple):

@@ -81,7 +81,9 @@ def take_in_pose(
     belief: Belief, pose: PoseVector, seen: Array, noise: Noise, limit: float
 ) -> tuple[Belief, PoseVector]:
     """The belief after a pose (3,), and its innovations (3,) over their standard deviations; 0 where unseen. Beyond
-    `limit` deviations an innovation counts no more than one of that size (Huber 1964)."""
+    `limit` deviations an innovation counts no more than one of that size (Huber 1964).
+
+    The rule is that of `filter.take_in`, which goes entry by entry; here one belief has up to 18 states."""
     mean, covariance = belief
     memory = noise.correlation_time is not None
     normalised = []

@@ -22,7 +22,7 @@ from jaxident.robot.noise import Noise
 STATES = 5
 Entry = Any
 """A number of a matrix, whatever its shape; None for a zero by construction."""
-Rows = tuple[tuple[Entry, ...], ...]
+MatrixRows = tuple[tuple[Entry, ...], ...]
 
 
 class Belief(NamedTuple):
@@ -36,7 +36,7 @@ class Entries(NamedTuple):
     """A belief entry by entry: mean, and rows of the covariance from the diagonal on."""
 
     mean: tuple
-    covariance: Rows
+    covariance: MatrixRows
 
 
 class RowInnovations(NamedTuple):
@@ -50,8 +50,8 @@ class Slopes(NamedTuple):
     """Derivatives of the state after a step, five rows each: by the state before, and by a held acceleration along and
     in heading."""
 
-    by_state: Rows
-    by_pull: Rows
+    by_state: MatrixRows
+    by_pull: MatrixRows
 
 
 def filter_run(solution: Hold, pull: Force, start: State, noise: Noise, run) -> tuple[PoseRows, PoseRows]:
@@ -104,7 +104,7 @@ def belief_of(entries: Entries) -> Belief:
     return Belief(jnp.stack(entries.mean), dense(tuple(_row(entries.covariance, i) for i in range(size))))
 
 
-def dense(rows: Rows) -> Array:
+def dense(rows: MatrixRows) -> Array:
     """A matrix from its rows of numbers."""
     return jnp.stack([jnp.stack([jnp.asarray(0.0 if entry is None else entry) for entry in row]) for row in rows])
 
@@ -174,24 +174,24 @@ def advance_with_slopes(state: State, pull: Force, solution: Hold) -> tuple[Stat
     return after, Slopes(by_state, tuple(tuple(speeds[2:]) for speeds in by_start))
 
 
-def _row(covariance: Rows, i: int) -> tuple:
+def _row(covariance: MatrixRows, i: int) -> tuple:
     """Row i of a symmetric matrix that is given from the diagonal on."""
     return tuple(covariance[min(i, j)][abs(i - j)] for j in range(len(covariance)))
 
 
-def _sandwich(left: Rows, covariance: Rows) -> Rows:
+def _sandwich(left: MatrixRows, covariance: MatrixRows) -> MatrixRows:
     """L P L' from the diagonal on."""
     columns = [_row(covariance, j) for j in range(len(covariance))]
     half = [tuple(_dot(row, column) for column in columns) for row in left]
     return tuple(tuple(_dot(row, other) for other in left[i:]) for i, row in enumerate(half))
 
 
-def _square(rows: Rows) -> Rows:
+def _square(rows: MatrixRows) -> MatrixRows:
     """A A' from the diagonal on."""
     return tuple(tuple(_dot(row, other) for other in rows[i:]) for i, row in enumerate(rows))
 
 
-def _add(one: Rows, other: Rows) -> Rows:
+def _add(one: MatrixRows, other: MatrixRows) -> MatrixRows:
     return tuple(tuple(map(_sum, a, b)) for a, b in zip(one, other, strict=True))
 
 
