@@ -68,8 +68,8 @@ def decide(prepared: Prepared, judgement: Judgement, selected: tuple[str, ...], 
     return "parameters" if moved else "no_gap"
 
 
-def advice(verdict: str, judgement: Judgement, laws: tuple[Shown, ...] = ()) -> str:
-    """What to record next, in a sentence."""
+def advice(verdict: str, judgement: Judgement, laws: tuple[Shown, ...], whole: bool) -> str:
+    """What to record next, in a sentence; `whole`: all of the log was used."""
     if verdict == "undecided":
         return "Record at least three runs of 500 samples with both wheels at many levels, forward and backward."
     sets = [cause for cause in judgement.causes if cause.indistinguishable_from]
@@ -83,4 +83,5 @@ def advice(verdict: str, judgement: Judgement, laws: tuple[Shown, ...] = ()) -> 
         return f"{begin} Runs in which its signal ({signal}) varies more would tell it better."
     if verdict in ("unknown", "partly"):
         return "No effect of the catalogue explains what is left: record runs that stay in the regions where it lies."
-    return "Nothing more is needed for this question; a longer log would find fainter effects."
+    longer = "; a longer log would find fainter effects" if whole else ""
+    return f"Nothing more is needed for this question{longer}."

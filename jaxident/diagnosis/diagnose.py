@@ -150,8 +150,8 @@ def diagnose(
     verdict = decide(prepared, judgement, selected, parameters)
     nominal = to_model(prepared, finding.nominal.vector, finding.law, (), None, finding.nominal)
     return Diagnosis(verdict, judgement, gap, account, where, selected, parameters, visible(known), replay(known, seed),
-                     advice(verdict, judgement, laws), nominal, corrected, shrinks, prepared, finding, surplus,
-                     simulator, laws, suspicions_of(join(logs), prepared),
+                     advice(verdict, judgement, laws, prepared.whole), nominal, corrected, shrinks, prepared, finding,
+                     surplus, simulator, laws, suspicions_of(join(logs), prepared),
                      refused, odometry(prepared, gap.paths, corrected))  # fmt: skip
 
 

@@ -64,7 +64,7 @@ PICTURE = (
 def _title(found: Diagnosis, number: int, begin: float, models: dict[str, Array]) -> str:
     """Run and time of a stretch, and how far each model ends from the measured position."""
     own = [length(np.sqrt(np.sum((errors[number] * found.gap.unit)[:2]))) for errors in models.values()]
-    return f"run {found.prepared.judging.run[number] + 1}, {begin:.4g} s\n{', corrected '.join(own)}"
+    return f"run {found.prepared.judging.run[number] + 1}, {begin:,.1f} s\n{', corrected '.join(own)}"
 
 
 def served(found: Diagnosis) -> Section:
@@ -80,9 +80,9 @@ def served(found: Diagnosis) -> Section:
 
 def left_out(found: Diagnosis) -> str:
     """How much of a long log was used, in a sentence; nothing where that is all of it."""
-    rows, (fit, judge) = len(found.prepared.log.t), found.prepared.served
-    if fit + judge >= rows:
+    if found.prepared.whole:
         return ""
+    rows, (fit, judge) = len(found.prepared.log.t), found.prepared.served
     return f"Of {rows:,} rows {fit:,} fit and {judge:,} judge: those whose commands tell most."
 
 

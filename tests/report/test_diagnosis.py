@@ -8,7 +8,7 @@ from support.diagnoses import LARGEST, VERDICTS, discovered_law, finding_of, mad
 
 from jaxident.diagnosis.account.discovered import Shown
 from jaxident.diagnosis.account.odometry import Odometry
-from jaxident.diagnosis.decide import Parameter
+from jaxident.diagnosis.decide import Parameter, advice
 from jaxident.diagnosis.diagnose import COASTED
 from jaxident.diagnosis.discovery.forms import PATCH, Form
 from jaxident.diagnosis.discovery.kinds import Kind
@@ -299,7 +299,7 @@ def test_the_worst_stretches_are_drawn_with_both_models():
     assert 3 not in worst
     axes = draw_stretches(found, worst[:1])
     begin = float(found.prepared.log.t[len(found.prepared.log.runs()[0].t) + 7 * found.prepared.rows])
-    assert plain_spaces(axes.get_title(loc="left")) == f"run 2, {begin:.4g} s\n14.1 mm, corrected 1.4 mm"
+    assert plain_spaces(axes.get_title(loc="left")) == f"run 2, {begin:,.1f} s\n14.1 mm, corrected 1.4 mm"
     assert [line.get_label() for line in axes.lines if line.get_label()[0] != "_"] == [
         *("measured", "nominal model", "corrected model")
     ]
@@ -334,6 +334,12 @@ def test_the_page_says_how_much_of_a_long_log_was_used():
     (table,) = tables(section(diagnosis_page(found, "runs"), "Which run served what"))
     assert sentence in table.caption
     assert diagnosis_to_dict(found)["rows"] == {"log": rows, "fitted": 500, "judged": 300}
+
+
+def test_a_longer_log_is_no_advice_where_not_all_rows_were_used():
+    judgement = made_up("no_gap")[1]
+    assert "a longer log would find fainter effects" in advice("no_gap", judgement, (), whole=True)
+    assert advice("no_gap", judgement, (), whole=False) == "Nothing more is needed for this question."
 
 
 def with_wheels(found):

@@ -66,6 +66,11 @@ class Prepared(NamedTuple):
     told: Any = None
     served: tuple[int, int] = (0, 0)
 
+    @property
+    def whole(self) -> bool:
+        """Whether every row of the log fits or judges."""
+        return sum(self.served) >= len(self.log.t)
+
 
 def prepare(
     logs,
