@@ -13,7 +13,7 @@ from jaxident.programs import kept_program
 
 AT_ONCE, FEW_PIECES = 4, 16
 """Vectors of one call, where windows are cut from so many pieces at most. A loop over the rows of 3, 4 and 16 pieces
-then takes 1.1, 1.0 and 2.7 times as long as for one vector; over 268 pieces four times as long."""
+then takes 1.1, 1.0 and 2.7 times as long as for one vector, over 268 four times (one core; none between was tried)."""
 _BY_DRIVE = [PLACES[pair] for pair in sorted(BY_DRIVE)]
 _PUSHING = [6, 7, *(place for (name, _), place in PLACES.items() if name in PUSHING)]
 

@@ -18,7 +18,7 @@ from jaxident.diagnosis.preparation.pose_screening import (
     frames_of,
     has_outliers,
 )
-from jaxident.diagnosis.preparation.roles import rows_of, split
+from jaxident.diagnosis.preparation.roles import rows_served, split
 from jaxident.effects.coordinates import neutral_vector
 from jaxident.errors import InputError
 from jaxident.estimation.ahead.stretches import Starts
@@ -104,7 +104,7 @@ def prepare(
     vector = neutral_vector(starting_point(fitted, pieces) if nominal is None else nominal)
     first = rough_fit(windows, vector, law)
     found = Prepared(given, largest, windows, judging, naming, only(given, pieces), rows, horizon,
-                     Frames(frozen, frozen), first, told=nominal, served=rows_of(roles))  # fmt: skip
+                     Frames(frozen, frozen), first, told=nominal, served=rows_served(roles))  # fmt: skip
     if law is not None:
         return found
     outlying, windows, first = without_outliers(fitted, windows, first, pieces)

@@ -16,8 +16,8 @@ LONGEST = 1000
 PARTS = 36
 """Parts at most that one or two runs are cut into."""
 MOST_FITTED, MOST_JUDGED = 16_000, 8_000
-"""Rows that fit, and rows that judge, at most: cost grows with both. With them a log of 1,000,000 rows takes as long as
-one of 22,200 (`experiments/speed.md`); no other numbers were tried. Logs of up to some 21,000 rows are used whole."""
+"""Rows that fit, and rows that judge, at most: cost grows with both. With them a log of 22,200 rows takes 28 s and one
+of 1,000,000 rows 32 s (`experiments/speed.md`); no other numbers were tried. Up to some 21,000 rows are all used."""
 SHORT = 400
 """Rows of the pieces among which those that tell most are chosen. No other number was tried."""
 
@@ -48,16 +48,19 @@ def split(log: Log, rows: int) -> Roles:
     return Roles(_most_telling(log, fit, MOST_FITTED, rows, lead), _most_telling(log, judge, MOST_JUDGED, rows, lead))
 
 
-def rows_of(roles: Roles) -> tuple[int, int]:
+def rows_served(roles: Roles) -> tuple[int, int]:
     """How many rows fit, and how many judge."""
-    fit, judge = (sum(piece.last - piece.first for piece in pieces) for pieces in roles)
-    return fit, judge
+    return _rows_in(roles.fit), _rows_in(roles.judge)
+
+
+def _rows_in(pieces: list[Piece]) -> int:
+    return sum(piece.last - piece.first for piece in pieces)
 
 
 def _most_telling(log: Log, pieces: list[Piece], most: int, rows: int, lead: int) -> list[Piece]:
     """The pieces, or short ones of them that have `most` rows together, at even steps of the information that the
     commands have gathered since the log began: many where the robot moves anyhow, few where it stands."""
-    if rows_of(Roles(pieces, []))[0] <= most:
+    if _rows_in(pieces) <= most:
         return pieces
     size, told = max(rows, SHORT // rows * rows), np.concatenate([[0.0], np.cumsum(leverages(log))])
     parts = [part for piece in pieces for part in _parts(piece.run, piece.first, piece.last, size)]
