@@ -5,6 +5,8 @@ integrals of what the wheels were asked for, so that it switches where it should
 """
 
 import functools
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -19,6 +21,10 @@ from jaxident.robot.drive import Physical, force, wheel_speeds
 PUSHING = tuple(effect.name for stage in INPUT for effect in CHAIN[stage] if effect.search is not None)
 """Effects that act before the wheels: beside the dead zones, pushes depend on nothing else but, by some coordinates
 (`coordinates.BY_DRIVE`), on the nominal drive."""
+REMEMBERING = tuple(effect.name for stage in ("slew", "gear") for effect in CHAIN[stage] if effect.search is not None)
+"""Effects among these that remember: each takes a loop over all rows."""
+Acts = Mapping[str, Array]
+"""For names of REMEMBERING whether any robot of a call has the effect, truth values (); others pass all as it is."""
 SUBSTEPS = 2
 """Per row; the nominal part is exact whatever their number."""
 RUN_UP = 3.0
@@ -30,25 +36,42 @@ JUST_BEFORE = 1e-9
 """Part of a step by which a delay reads early: its derivative at zero is that of a growing delay."""
 
 
-def pushes(settings, drive: Physical, dead_zone: Array, t: Array, session: Array, command: Array) -> Push:
+def pushes(
+    settings, drive: Physical, dead_zone: Array, t: Array, session: Array, command: Array, acts: Acts | None = None
+) -> Push:
     """The pushes of runs: t (rows, runs) [s], session (runs,) [s], command (rows, runs, 2); dead_zone (2,). drive: what
-    tells the speed of wheels that coast."""
-    return expected_pushes(settings, drive, dead_zone, t, session, command, None)[0]
+    tells the speed of wheels that coast. acts: see `_unless_idle`."""
+    return expected_pushes(settings, drive, dead_zone, t, session, command, None, acts)[0]
 
 
 def expected_pushes(
-    settings, drive: Physical, dead_zone: Array, t: Array, session: Array, command: Array, lost: Array | None
+    settings,
+    drive: Physical,
+    dead_zone: Array,
+    t: Array,
+    session: Array,
+    command: Array,
+    lost: Array | None,
+    acts: Acts | None = None,
 ) -> tuple[Push, Array | None]:
     """The pushes that are to be expected where each command is lost with a probability, and the deviation of the jolts
     (rows, runs, 2) that losing them makes (`_expected`); with None lost, as `pushes`, and None."""
     part = _lengths(t) / SUBSTEPS
     arrived = _arrived(settings, t, session)
     own = _lengths(arrived) / SUBSTEPS
-    asked, jolt = _asked(settings, dead_zone, t, session, command, own), None
+    asked, jolt = _asked(settings, dead_zone, t, session, command, own, acts), None
     if lost is not None:
         asked, jolt = _expected(asked, lost)
     asked = _read(asked, arrived, own, t, part)
-    return _remembered(settings, drive, asked, part), jolt
+    return _remembered(settings, drive, asked, part, acts), jolt
+
+
+def _unless_idle(effect: EffectRecord, acts: Acts | None, run: Callable[[Any], Any], value: Any) -> Any:
+    """What an effect that remembers makes of a value: a loop over rows, which is left out where `acts` says that it
+    does nothing. Without `acts`, and of effects that are not in it, every loop is run."""
+    if acts is None or effect.name not in acts:
+        return run(value)
+    return jax.lax.cond(acts[effect.name], run, lambda same: same, value)
 
 
 def _lengths(t: Array) -> Array:
@@ -63,13 +86,18 @@ def _arrived(settings, t: Array, session: Array) -> Array:
     return t
 
 
-def _asked(settings, dead_zone: Array, t: Array, session: Array, command: Array, part: Array) -> Push:
+def _asked(
+    settings, dead_zone: Array, t: Array, session: Array, command: Array, part: Array, acts: Acts | None
+) -> Push:
     """Pushes of each row from every static law, on a time axis that starts when the row arrives; substeps are `part`
     long there."""
     sent = Wheels(command[..., 0], command[..., 1])
     for effect, values in acting("command", settings):
         sent = effect.law(sent, **values)
-    slews = [(*one, _slewed(*one, sent, part * SUBSTEPS)) for one in acting("slew", settings)]
+    slews = []
+    for effect, values in acting("slew", settings):
+        run = functools.partial(_slewed, effect, values, step=part * SUBSTEPS)
+        slews.append((effect, values, _unless_idle(effect, acts, run, sent)))
 
     def at(elapsed):
         """The pushes `elapsed` [s] (rows, runs) after each row."""
@@ -150,14 +178,19 @@ def _integral(pieces: Array) -> Array:
     return jnp.concatenate([jnp.zeros_like(pieces[:1]), jnp.cumsum(pieces, axis=0)])
 
 
-def _remembered(settings, drive: Physical, asked: Push, part: Array) -> Push:
+def _remembered(settings, drive: Physical, asked: Push, part: Array, acts: Acts | None) -> Push:
     """Pushes (rows * substeps, runs, 2) behind the gears, as (rows, runs, substeps, 2)."""
     rows, runs = part.shape
     size = jnp.repeat(part, SUBSTEPS, axis=0)[..., None]
     for effect, values in acting("gear", settings):
-        run = functools.partial(scanned, effect) if effect.fast is None else effect.fast
-        asked = run(asked, drive, size, **values)
+        law = functools.partial(scanned, effect) if effect.fast is None else effect.fast
+        run = functools.partial(_passed, law, drive, size, values)
+        asked = _unless_idle(effect, acts, run, asked)
     return Push(*(x.reshape(rows, SUBSTEPS, runs, 2).transpose(0, 2, 1, 3) for x in asked))
+
+
+def _passed(law: Callable[..., Push], drive: Physical, size: Array, values, asked: Push) -> Push:
+    return law(asked, drive, size, **values)
 
 
 def scanned(effect: EffectRecord, asked: Push, drive: Physical, size: Array, **values) -> Push:

@@ -10,7 +10,7 @@ from jaxident.diagnosis.account.shrink import LOW, taken
 from jaxident.diagnosis.causes.columns import tabulate
 from jaxident.diagnosis.causes.finding import Finding
 from jaxident.diagnosis.causes.moves import stands
-from jaxident.diagnosis.causes.settled import Settled, noise_beside, whiten
+from jaxident.diagnosis.causes.settled import noise_beside, whiten
 from jaxident.diagnosis.fit.refit import refit
 from jaxident.effects.coordinates import NOMINAL, PLACES, neutral_vector
 
@@ -53,8 +53,7 @@ def finding_without(finding: Finding, refused: Collection[str]) -> Finding:
     for _ in range(TURNS):
         data, _ = whiten(finding.nominal, finding.data.windows, law)
         now = stands(refit(data, vector, finding.nominal.starts, names), names)
-        state = Settled(now, data, tabulate(data, now.fit, names), {})
-        likely, rest = noise_beside(state, law, sized=True)
+        likely, rest = noise_beside(data, now.fit, law)
         law, vector = rest.law, now.fit.vector
     nominal = refit(data, finding.nominal.vector, finding.nominal.starts, ())
     values = {frozenset(): stands(nominal, ()).evidence - now.evidence, frozenset(names): 0.0}

@@ -84,6 +84,35 @@ class _Column(NamedTuple):
     sign: float = 1.0
 
 
+class Answers(NamedTuple):
+    """What a table about a fit is made from: options and their columns, the answers (windows, numbers, columns) of the
+    poses to these, the linearisation about the fit, and the answers of the rims, None without wheel speeds."""
+
+    options: list[Option]
+    columns: list[_Column]
+    poses: Any
+    linear: Linear
+    rims: Any = None
+
+
+def answers_of(data: Data, fit: Solution, active: Collection[str]) -> Answers:
+    """The answers about a fit that has some effects: they take most of a table's time."""
+    options: list[Option] = []
+    columns: list[_Column] = []
+    for name in COORDINATES:
+        for point, price, own in _ways(data, fit, name, name in active):
+            options.append(Option(name, tuple(range(len(columns), len(columns) + len(own))), point, price))
+            columns += own
+    places = [column.place for column in columns if column.place is not None]
+    vectors = [column.vector for column in columns if column.place is None]
+    linear = linearise(fit.vector, fit.starts, data.windows, [*range(len(NOMINAL)), *places])
+    poses = _in_order(columns, linear.slopes, differences(data, fit, vectors))
+    rims = None
+    if data.rims is not None:
+        rims = _in_order(columns, linear.rims.slopes, rim_differences(data, fit, vectors))
+    return Answers(options, columns, poses, linear, rims)
+
+
 def tabulate(
     data: Data,
     fit: Solution,
@@ -91,23 +120,17 @@ def tabulate(
     rest: Array | None = None,
     free: bool = False,
     owners: Collection[str] = (),
+    answers: Answers | None = None,
 ) -> Table:
     """The table about a fit that has some effects. rest (windows, numbers, terms): answers of the poses to what is in
     no catalogue, taken away; or free like nominal parameters, so that it may stand in for effects, but not for the
-    `owners` among them, to which counts what both can do."""
-    options: list[Option] = []
-    columns: list[_Column] = []
-    for name in COORDINATES:
-        for point, price, own in _ways(data, fit, name, name in active):
-            options.append(Option(name, tuple(range(len(columns), len(columns) + len(own))), point, price))
-            columns += own
+    `owners` among them, to which counts what both can do. answers: those about this fit, if they are known."""
+    options, columns, poses, linear, rims = answers_of(data, fit, active) if answers is None else answers
     here = {option.effect: k for k, option in enumerate(options) if option.effect in active}
-    answers, linear = _answers(data, fit, columns)
     more = np.zeros((*linear.residual.shape, 0)) if rest is None else rest
     base = np.concatenate([linear.slopes[..., : len(NOMINAL)], more], axis=2)
-    whole = np.concatenate([base, answers, linear.residual[..., None]], axis=2)
-    more_rows = _rim_rows(data, fit, linear, columns, more.shape[2])
-    products = gram(data.whitener, whole, linear.starts, more_rows).products
+    whole = np.concatenate([base, poses, linear.residual[..., None]], axis=2)
+    products = gram(data.whitener, whole, linear.starts, _rim_rows(data, linear.rims, rims, more.shape[2])).products
     owned = [base.shape[2] + column for name in owners for column in options[here[name]].columns]
     products = _less_owned(products, range(len(NOMINAL), base.shape[2]), owned)
     cross = products[:, :-1, -1] + products[:, :-1, base.shape[2] : -1] @ [column.value for column in columns]
@@ -171,31 +194,21 @@ def _pairs(name: str) -> list[tuple[str, str]]:
     return [(name, coordinate.name) for coordinate in COORDINATES[name]]
 
 
-def _answers(data: Data, fit: Solution, columns: list[_Column]) -> tuple[np.ndarray, Linear]:
-    """Answers of the poses (windows, numbers, columns), and the linearisation, nominal parameters first."""
-    places = [column.place for column in columns if column.place is not None]
-    linear = linearise(fit.vector, fit.starts, data.windows, [*range(len(NOMINAL)), *places])
-    change = differences(data, fit, [column.vector for column in columns if column.place is None])
-    slopes, jumps = iter(np.moveaxis(linear.slopes[..., len(NOMINAL) :], -1, 0)), iter(np.moveaxis(change, -1, 0))
-    own = [column.sign * next(jumps if column.place is None else slopes) for column in columns]
-    answers = np.stack(own, axis=-1)
+def _in_order(columns: list[_Column], slopes: Array, differences: Array) -> np.ndarray:
+    """Answers (windows, numbers, columns): slopes, those of the nominal parameters first, and differences in the order
+    of the columns. A robot that runs away answers nothing."""
+    slope, jump = iter(np.moveaxis(slopes[..., len(NOMINAL) :], -1, 0)), iter(np.moveaxis(differences, -1, 0))
+    answers = np.stack([c.sign * next(jump if c.place is None else slope) for c in columns], axis=-1)
     with np.errstate(over="ignore", invalid="ignore"):
         largest = np.max(np.abs(answers), axis=(0, 1), initial=0.0) * [column.scale for column in columns]
-    return np.where(largest < FAR, answers, 0.0), linear  # a robot that runs away answers nothing
+    return np.where(largest < FAR, answers, 0.0)
 
 
-def _rim_rows(data: Data, fit: Solution, linear: Linear, columns: list[_Column], rest: int) -> np.ndarray | None:
-    """White rows of the rims for the columns of a table; what is in no catalogue moves no rim, as random slip does
-    not."""
-    if data.rims is None:
+def _rim_rows(data: Data, own: Linear | None, answers: Array | None, rest: int) -> np.ndarray | None:
+    """White rows of the rims for the columns of a table; what is in no catalogue, `rest` columns, moves no rim, as
+    random slip does not."""
+    if own is None or answers is None:
         return None
-    own = linear.rims
-    change = rim_differences(data, fit, [column.vector for column in columns if column.place is None])
-    slopes, jumps = iter(np.moveaxis(own.slopes[..., len(NOMINAL) :], -1, 0)), iter(np.moveaxis(change, -1, 0))
-    answers = np.stack([c.sign * next(jumps if c.place is None else slopes) for c in columns], axis=-1)
-    with np.errstate(over="ignore", invalid="ignore"):
-        largest = np.max(np.abs(answers), axis=(0, 1), initial=0.0) * [column.scale for column in columns]
-    answers = np.where(largest < FAR, answers, 0.0)
     none = np.zeros((*own.residual.shape, rest))
     return data.of_rims(own, own.slopes[..., : len(NOMINAL)], none, answers, residual=True)
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.columns import Table, tabulate
+from jaxident.diagnosis.causes.columns import Table, answers_of, tabulate
 from jaxident.diagnosis.causes.discrepancy import UNEXPLAINED, Rest
 from jaxident.diagnosis.causes.discrepancy_basis import WORTH
 from jaxident.diagnosis.causes.evidence import worth
@@ -117,13 +117,13 @@ def climb(
     while True:
         state = settle(windows, now, law, None if rest is None else rest.answers, without)
         now, before = state.now, rest
-        likely, rest = noise_beside(state, law, sized, last)
+        likely, rest = noise_beside(state.data, now.fit, law, sized, last)
         if sized and laws < MOST_LAWS and not (before is not None and same_law(rest.law, law)):
             law, laws = rest.law, laws + 1
             continue
         if not last:
             last, laws = True, MOST_LAWS - 1
-            likely, rest = noise_beside(state, law, sized, last)
+            likely, rest = noise_beside(state.data, now.fit, law, sized, last)
             if not same_law(rest.law, law):
                 law = rest.law
                 continue
@@ -152,7 +152,8 @@ def settle(windows: Windows, now: Move, law: Law, rest: Array | None, without: C
     now = stands(refit(data, now.fit.vector, now.fit.starts, now.effects), now.effects)
     tried: dict[frozenset[str], float] = {frozenset(now.effects): 0.0}
     for number in range(MOST_ROUNDS):
-        table = tabulate(data, now.fit, now.effects, rest)
+        answers = answers_of(data, now.fit, now.effects)
+        table = tabulate(data, now.fit, now.effects, rest, answers=answers)
         chosen = best_set(table, [table.here[name] for name in now.effects], without)
         found = _taken(data, table, now, chosen, tried)
         if found is None and number < MOST_ROUNDS - LAST_ROUNDS:
@@ -164,8 +165,9 @@ def settle(windows: Windows, now: Move, law: Law, rest: Array | None, without: C
             tried[frozenset(found.effects)] = 0.0
         now = found
     else:  # the last fit has no table yet
-        table = tabulate(data, now.fit, now.effects, rest)
-    return Settled(now, data, table, tried)
+        answers = answers_of(data, now.fit, now.effects)
+        table = tabulate(data, now.fit, now.effects, rest, answers=answers)
+    return Settled(now, data, table, tried, answers)
 
 
 def _taken(data: Data, table: Table, now: Move, chosen: list[int], tried: dict[frozenset[str], float]) -> Move | None:
@@ -197,18 +199,18 @@ def defended(found: Found) -> Found:
     while True:
         state, rest = found.settled, found.rest
         data, now = state.data, state.now
-        table = tabulate(data, now.fit, now.effects, rest.answers, free=True, owners=owners)
+        table = tabulate(data, now.fit, now.effects, rest.answers, free=True, owners=owners, answers=state.answers)
         here = [table.here[name] for name in now.effects]
         own = {k: worth(table, here, k).evidence for k in here}
         weakest = min(own, key=lambda k: own[k], default=None)
         if weakest is None or own[weakest] >= SURE:
-            return found._replace(settled=state._replace(table=table))
+            return found._replace(settled=state._replace(table=table, answers=None))
         owners = [name for name in owners if name != table.options[weakest].effect]
         fewer = fit_options(data, table, now, [k for k in here if k != weakest])
         assert fewer is not None  # no limit was set
         now, tried = fewer, {key: v + now.evidence - fewer.evidence for key, v in state.tried.items()}
-        state = state._replace(now=now, tried=tried)
-        found = found._replace(settled=state, rest=noise_beside(state, found.law, sized=False)[1])
+        state = state._replace(now=now, tried=tried, answers=None)
+        found = found._replace(settled=state, rest=noise_beside(data, now.fit, found.law, sized=False)[1])
 
 
 def _owners(found: Found) -> list[str]:
@@ -219,8 +221,8 @@ def _owners(found: Found) -> list[str]:
     these apart. A name that explains as much comes first. A Create's turn loss brings 294, all terms beside it 34.
     Where a heading has an error that no catalogue lists, a tilt of the camera brings 6364, and terms beside it 2163.
     """
-    (now, data, _, _), rest = found.settled, found.rest
-    table = tabulate(data, now.fit, now.effects, rest.answers)
+    (now, data, _, _, answers), rest = found.settled, found.rest
+    table = tabulate(data, now.fit, now.effects, rest.answers, answers=answers)
     here = [table.here[name] for name in now.effects]
     gains = {name: worth(table, here, table.here[name]).gain for name in now.effects}
     return [name for name, gain in gains.items() if rest.gain < UNEXPLAINED * (gain + rest.gain)]

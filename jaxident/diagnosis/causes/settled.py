@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from jaxident.diagnosis.causes.columns import Table
+from jaxident.diagnosis.causes.columns import Answers, Table
 from jaxident.diagnosis.causes.discrepancy import Rest, unexplained
 from jaxident.diagnosis.causes.moves import Move
 from jaxident.diagnosis.fit.refit import Data, Solution
@@ -23,18 +23,18 @@ would be too low, and too sure."""
 
 
 class Settled(NamedTuple):
-    """Where a search stands under one noise law: the fit and its effects, the data, the table there, and the log
-    evidence, less that of the fit, of sets that were refitted."""
+    """Where a search stands under one noise law: the fit and its effects, the data, the table there, the log evidence,
+    less that of the fit, of sets that were refitted, and the answers that the table is made from."""
 
     now: Move
     data: Data
     table: Table
     tried: dict[frozenset[str], float]
+    answers: Answers | None = None
 
 
-def noise_beside(state: Settled, law: Law, sized: bool, memory_too: bool = True) -> tuple[Law, Rest]:
-    """The likeliest law at the fit, and what is in no catalogue with the law beside it."""
-    fit, data = state.now.fit, state.data
+def noise_beside(data: Data, fit: Solution, law: Law, sized: bool = True, memory_too: bool = True) -> tuple[Law, Rest]:
+    """The likeliest law at a fit, and what is in no catalogue with the law beside it."""
     responses = respond(np.exp(fit.vector[:2]), fit.linear.residual, data.windows)
     if sized:
         residual, starts = fit.linear.residual, fit.linear.starts

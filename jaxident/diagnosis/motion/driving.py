@@ -1,21 +1,62 @@
-"""What drives the wheels under many vectors: each different push is computed once, side by side on all cores."""
+"""Programs that follow windows, run for many vectors: some in each call, side by side on all cores.
+
+What drives the wheels is computed once for all vectors that drive them alike.
+"""
+
+import functools
+from collections.abc import Callable
+from typing import Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 
 from jaxident.array_types import Array, Wheels
 from jaxident.diagnosis.motion.paths import push_of
 from jaxident.diagnosis.motion.windows import Windows
-from jaxident.effects.coordinates import BY_DRIVE, NOMINAL, PLACES
-from jaxident.effects.fast_input import PUSHING, Push
+from jaxident.effects.coordinates import BY_DRIVE, NOMINAL, PLACES, neutral_vector
+from jaxident.effects.discovered import Laws
+from jaxident.effects.fast_input import PUSHING, REMEMBERING, Push
 from jaxident.parallel import in_parallel
 from jaxident.programs import kept_program
 
-AT_ONCE, FEW_PIECES = 4, 16
-"""Vectors of one call, where windows are cut from so many pieces at most. A loop over the rows of 3, 4 and 16 pieces
-then takes 1.1, 1.0 and 2.7 times as long as for one vector, over 268 four times (one core; none between was tried)."""
+AT_ONCE = 4
+"""Vectors of one call. On one core 24, 40, 80 and 160 windows then take 0.46, 0.57, 0.54 and 0.88 of the time a vector;
+with eight vectors 0.39, 0.53, 0.47 and 1.02."""
+FEW_PIECES = 16
+"""Pieces that windows are cut from, at most, where pushes of several vectors take one call. A loop over the rows of 3,
+4 and 16 pieces then takes 1.1, 1.0 and 2.7 times as long as for one vector, over 268 four times (one core; none
+between was tried)."""
 _BY_DRIVE = [PLACES[pair] for pair in sorted(BY_DRIVE)]
 _PUSHING = [6, 7, *(place for (name, _), place in PLACES.items() if name in PUSHING)]
+_REMEMBERING = {name: [place for (own, _), place in PLACES.items() if own == name] for name in REMEMBERING}
+_NEUTRAL = neutral_vector(np.zeros(len(NOMINAL)))
+
+
+def each_of(program: Callable[..., Any]) -> Callable[..., Any]:
+    """A program of one vector (SIZE,), starts (5, windows), push, windows and laws as one of AT_ONCE of the first
+    three: arrays (AT_ONCE, ...) and a list of pushes. It keeps the name, by which `kept_program` tells programs
+    apart."""
+
+    @functools.wraps(program)
+    def of_several(vectors: Array, starts: Array, push: list[Push], windows: Windows, laws: Laws | None) -> Any:
+        stacked = jax.tree.map(lambda *parts: jnp.stack(parts), *push)
+        return jax.vmap(program, in_axes=(0, 0, 0, None, None))(vectors, starts, stacked, windows, laws)
+
+    return of_several
+
+
+def run_each(several: Callable[..., Any], vectors: Array, starts: Array, windows: Windows, laws: Laws | None) -> Any:
+    """Results (batch, ...) of a program that `each_of` made, at vectors (batch, SIZE) and starts (batch, 5, windows).
+
+    The last vector fills up the last call, so that there is one program for any number of vectors.
+    """
+    windows, count = jax.tree.map(jnp.asarray, windows), len(vectors)
+    push = pushes_of(vectors, windows)
+    blocks = [np.minimum(np.arange(k, k + AT_ONCE), count - 1) for k in range(0, count, AT_ONCE)]
+    lanes = [(vectors[block], starts[block], [push[k] for k in block], windows, laws) for block in blocks]
+    found = in_parallel(several, lanes, ahead=False)
+    return jax.tree.map(lambda *parts: np.concatenate(parts)[:count], *found)
 
 
 def pushes_of(vectors: Array, windows: Windows) -> list[Push]:
@@ -37,5 +78,6 @@ def pushes_of(vectors: Array, windows: Windows) -> list[Push]:
 @kept_program(Windows, Wheels, Push)
 def _pushed(vectors: Array, windows: Windows) -> list[Push]:
     """`push_of` under each vector (batch, SIZE)."""
-    found = jax.vmap(push_of, in_axes=(0, None))(vectors, windows)
+    acts = {name: jnp.any(vectors[:, own] != _NEUTRAL[own]) for name, own in _REMEMBERING.items()}
+    found = jax.vmap(push_of, in_axes=(0, None, None))(vectors, windows, acts)
     return [jax.tree.map(lambda part, k=k: part[k], found) for k in range(len(vectors))]

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxident.array_types import Array, State, Wheels
-from jaxident.diagnosis.motion.driving import pushes_of
+from jaxident.diagnosis.motion.driving import each_of, pushes_of, run_each
 from jaxident.diagnosis.motion.paths import move, residuals
 from jaxident.diagnosis.motion.responses import answer_to_start
 from jaxident.diagnosis.motion.rims import rim_speeds
@@ -20,7 +20,6 @@ from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.coordinates import limits, sizes
 from jaxident.effects.discovered import Laws
 from jaxident.effects.fast_input import Push
-from jaxident.parallel import in_parallel
 from jaxident.programs import kept_program
 
 START_STATES = 5
@@ -50,19 +49,13 @@ class Gram(NamedTuple):
 
 
 _OF_MOTION = Push, Windows, Wheels, Laws
-_moved, _tracked = kept_program(*_OF_MOTION)(residuals), kept_program(*_OF_MOTION, State)(move)
+_residuals, _tracked = kept_program(*_OF_MOTION)(each_of(residuals)), kept_program(*_OF_MOTION, State)(move)
 
 
 def follow(vectors: Array, starts: Array, windows: Windows, laws: Laws | None = None) -> np.ndarray:
-    """Residuals (batch, windows, numbers) at vectors (batch, SIZE) and starts (batch, 5, windows).
-
-    One program takes one vector, and every core runs a program: a program of more vectors runs no faster.
-    """
-    windows = jax.tree.map(jnp.asarray, windows)
-    push = pushes_of(vectors, windows)
-    lanes = [(*each, windows, laws) for each in zip(vectors, starts, push, strict=True)]
-    whole = np.stack([np.asarray(one) for one in in_parallel(_moved, lanes, ahead=False)])
-    return whole.transpose(0, 2, 1, 3).reshape(len(whole), whole.shape[2], -1)
+    """Residuals (batch, windows, numbers) at vectors (batch, SIZE) and starts (batch, 5, windows)."""
+    found = run_each(_residuals, vectors, starts, windows, laws)
+    return found.transpose(0, 2, 1, 3).reshape(len(found), found.shape[2], -1)
 
 
 def linearise(vector: Array, starts: Array, windows: Windows, places: list[int], laws: Laws | None = None) -> Linear:

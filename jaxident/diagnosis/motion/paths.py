@@ -7,7 +7,7 @@ from jaxident.array_types import Array, Pose, State, Wheels
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.coordinates import by_effect
 from jaxident.effects.discovered import Laws, with_laws
-from jaxident.effects.fast_input import SUBSTEPS, Push, pushes
+from jaxident.effects.fast_input import SUBSTEPS, Acts, Push, pushes
 from jaxident.effects.fast_motion import Row, advance_row, drive_of, lags_of, report, rolling
 from jaxident.effects.past import Past, past_of
 from jaxident.numerics import wrap
@@ -32,9 +32,10 @@ def track(vector: Array, starts: Array, windows: Windows, laws: Laws | None = No
     return move(vector, starts, push_of(vector, windows), windows, laws)
 
 
-def push_of(vector: Array, windows: Windows) -> Push:
+def push_of(vector: Array, windows: Windows, acts: Acts | None = None) -> Push:
     """What drives the wheels: pushes of whole runs cut into windows, (rows, substeps, 2, windows)."""
-    push = pushes(by_effect(vector), drive_of(vector), vector[6:8], windows.t, windows.session, windows.command)
+    runs = windows.t, windows.session, windows.command
+    push = pushes(by_effect(vector), drive_of(vector), vector[6:8], *runs, acts)
     rows = windows.step.shape[0]
     places = jnp.minimum(windows.first + jnp.arange(rows)[:, None], push.mean.shape[0] - 1)
     return Push(*(part[places, windows.run].transpose(0, 2, 3, 1) for part in push))

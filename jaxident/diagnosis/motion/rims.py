@@ -8,19 +8,16 @@ first; numbers are the rows' mean speeds of both wheels, then half their differe
 
 from typing import Any, NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from jaxident.array_types import Array, Wheels
-from jaxident.diagnosis.motion.driving import pushes_of
+from jaxident.diagnosis.motion.driving import each_of, run_each
 from jaxident.diagnosis.motion.paths import rolled
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.coordinates import POSES_ONLY, of_wheels
 from jaxident.effects.discovered import Laws
 from jaxident.effects.fast_input import Push
 from jaxident.estimation.poses.wheel_colour import samples_each
-from jaxident.parallel import in_parallel
 from jaxident.programs import kept_program
 
 SAME = 1e-6
@@ -60,17 +57,14 @@ def untold(windows: Windows) -> frozenset[str]:
     return POSES_ONLY if windows.wheels is None else frozenset()
 
 
-_rolled = kept_program(Push, Windows, Wheels, Laws)(rolled)
+_rolled = kept_program(Push, Windows, Wheels, Laws)(each_of(rolled))
 
 
 def rim_speeds(vectors: Array, starts: Array, windows: Windows, laws: Laws | None = None) -> np.ndarray:
     """Speed [m/s] and turn rate [rad/s] of the rims (batch, windows, numbers) at vectors (batch, SIZE) and starts
     (batch, 5, windows)."""
-    windows, vectors = jax.tree.map(jnp.asarray, windows), of_wheels(vectors)
-    push = pushes_of(vectors, windows)
-    lanes = [(*each, windows, laws) for each in zip(vectors, starts, push, strict=True)]
-    found = in_parallel(_rolled, lanes, ahead=False)
-    return np.stack([np.concatenate([np.asarray(v).T, np.asarray(w).T], axis=1) for v, w in found])
+    speed, turn = run_each(_rolled, of_wheels(vectors), starts, windows, laws)
+    return np.concatenate([speed, turn], axis=1).transpose(0, 2, 1)
 
 
 def measured_rims(windows: Windows) -> tuple[np.ndarray, np.ndarray]:

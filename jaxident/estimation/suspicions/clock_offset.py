@@ -31,7 +31,11 @@ FEWEST = 60
 MOST_CELLS = 1 << 18
 """Cells of the even grid of the search."""
 STEPS, EARLY = 14, 4
-"""Of Gauss-Newton, and of those without whitening."""
+"""Of Gauss-Newton at most, and of those without whitening."""
+ARRIVED = 1e-6
+"""Step of the offset [s] and of the logarithms of the rates at which the fit ends. No other number was tried."""
+PART = 1e-5
+"""Of a rate: the step of the derivative by its logarithm."""
 DOUBT = 10.0
 """Log likelihood by which an offset must lead another, one second or more away."""
 LONGEST_STEP = 0.3
@@ -177,13 +181,14 @@ def _tabulate(streams: Streams, offset: float, rates: np.ndarray) -> _Table:
     length = np.diff(at, axis=1)
 
     def moved(rate: float) -> tuple[np.ndarray, np.ndarray]:
-        first, last = (follow_commands(streams.command_t, u, rate, side) for side in at.T)
-        return last[0] - first[0], last[1] - first[1]
+        found = follow_commands(streams.command_t, u, rate, at.T.ravel())  # both ends at once: the lag is slow
+        travelled, speed = (each[len(at) :] - each[: len(at)] for each in found)
+        return travelled, speed
 
     columns, by_offset, by_rate = [], [], []
     for rate in rates:
         value, slope = moved(rate)
-        change = (moved(rate * 1.001)[0] - moved(rate / 1.001)[0]) / (2.0 * np.log(1.001))
+        change = (moved(rate * (1.0 + PART))[0] - value) / PART
         columns.append(np.concatenate([value, length], axis=1))
         by_offset.append(np.pad(slope, ((0, 0), (0, 1))))
         by_rate.append(np.pad(change, ((0, 0), (0, 1))))
@@ -208,10 +213,11 @@ def _fit(streams: Streams, offset: float, rate: float) -> Response | None:
             white = _whiten(table, filters, kept)
         slopes, left, scale = _stack(white, gains)
         inverse = inverse_of_products(slopes)
-        if step < STEPS:
-            moved = inverse @ (slopes.T @ left)
-            offset += float(np.clip(moved[0], -LONGEST_STEP, LONGEST_STEP))
-            rates = np.clip(rates * np.exp(np.clip(moved[1:3], -0.7, 0.7)), SLOWEST_RATE, FASTEST_RATE)
+        moved = (inverse @ (slopes.T @ left))[:3]
+        if step == STEPS or (step > EARLY and np.max(np.abs(moved)) < ARRIVED):
+            break
+        offset += float(np.clip(moved[0], -LONGEST_STEP, LONGEST_STEP))
+        rates = np.clip(rates * np.exp(np.clip(moved[1:], -0.7, 0.7)), SLOWEST_RATE, FASTEST_RATE)
     deviation = np.sqrt(np.maximum(np.diagonal(inverse @ score_covariance(slopes, left) @ inverse), 0.0))
     whole = np.var(table.y, axis=1)
     explained = np.where(whole > 0.0, 1.0 - np.var(residual, axis=1) / np.where(whole > 0.0, whole, 1.0), 0.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support.small_robot import LAW, VECTOR, nominal_fit, robot_with, windows_of
 
-from jaxident.diagnosis.causes.columns import AMPLITUDE, FAR, _answers, _Column, tabulate
+from jaxident.diagnosis.causes.columns import AMPLITUDE, FAR, _Column, _in_order, answers_of, tabulate
 from jaxident.diagnosis.causes.evidence import log_evidence, posterior_mean
 from jaxident.diagnosis.causes.moves import fit_options, stands
 from jaxident.diagnosis.causes.points import differences, points_of, seeded, sizes_of
@@ -119,6 +119,18 @@ def test_an_effect_that_the_fit_has_shows_with_its_own_size(explained):
         assert table.scale[column] == sizes()[place]
     others = [option for option in table.options if option.effect in effects]
     assert len(others) == len(effects), "what the fit has takes part as it is, and in no other way"
+
+
+def test_answers_that_are_known_make_the_same_table(explained):
+    data, fit, effects = explained
+    rest = np.random.default_rng(0).normal(size=(*fit.linear.residual.shape, 2))
+    known = answers_of(data, fit, effects)
+    for kind in ({}, {"free": True, "owners": effects[:1]}):
+        fresh, again = (tabulate(data, fit, effects, rest, answers=one, **kind) for one in (None, known))
+        assert fresh.options == again.options
+        assert fresh.here == again.here
+        for one, other in zip(fresh[2:], again[2:], strict=True):
+            np.testing.assert_array_equal(one, other)
 
 
 def test_an_effect_without_a_derivative_that_the_fit_has_is_there_once():
@@ -261,7 +273,7 @@ def test_a_point_at_which_the_robot_runs_away_answers_nothing(plain):
     answers = differences(data, nominal, [away, near])
     assert np.nanmax(np.abs(answers[..., 0])) > FAR
     columns = [_Column(AMPLITUDE, True, vector=vector) for vector in (away, near)]
-    kept = _answers(data, nominal, columns)[0]
+    kept = _in_order(columns, nominal.linear.slopes, answers)
     assert not kept[..., 0].any()
     np.testing.assert_array_equal(kept[..., 1], answers[..., 1])
 

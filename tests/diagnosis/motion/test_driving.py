@@ -1,0 +1,60 @@
+"""Many vectors at once against one after the other, and loops that are left out against all loops."""
+
+import jax
+import numpy as np
+import pytest
+from support.small_robot import VECTOR, windows_of
+
+from jaxident.diagnosis.motion.driving import AT_ONCE, pushes_of
+from jaxident.diagnosis.motion.linear import follow
+from jaxident.diagnosis.motion.paths import push_of, residuals, rolled
+from jaxident.diagnosis.motion.rims import rim_speeds
+from jaxident.effects.catalogue import CATALOGUE
+from jaxident.effects.coordinates import PLACES, from_catalogue
+from jaxident.effects.fast_input import REMEMBERING
+
+OTHERS = ("turn_loss", "slope", "transport_delay", "mass_offset")
+_push, _residuals, _rolled = jax.jit(push_of), jax.jit(residuals), jax.jit(rolled)
+
+
+@pytest.fixture(scope="module")
+def windows():
+    return jax.tree.map(jax.numpy.asarray, windows_of(VECTOR))
+
+
+def vector_with(name) -> np.ndarray:
+    """The small robot with a typical effect."""
+    vector = VECTOR.copy()
+    for key, value in from_catalogue(name, CATALOGUE[name].typical()).items():
+        vector[PLACES[name, key]] = value
+    return vector
+
+
+def starts_of(count, windows) -> np.ndarray:
+    return 0.1 * np.random.default_rng(count).normal(size=(count, 5, len(windows.run)))
+
+
+@pytest.mark.parametrize("count", [1, AT_ONCE, AT_ONCE + 1, 2 * AT_ONCE - 1])
+def test_vectors_side_by_side_are_those_one_after_the_other(windows, count):
+    names = (OTHERS * 2)[:count]
+    vectors, starts = np.stack([vector_with(name) for name in names]), starts_of(count, windows)
+    found, rims = follow(vectors, starts, windows), rim_speeds(vectors, starts, windows)
+    assert len(found) == len(rims) == count
+    for k, vector in enumerate(vectors):
+        push = _push(vector, windows)
+        alone = np.asarray(_residuals(vector, starts[k], push, windows)).transpose(1, 0, 2).reshape(len(found[k]), -1)
+        np.testing.assert_allclose(found[k], alone, atol=1e-9)
+        speeds = np.concatenate([np.asarray(part).T for part in _rolled(vector, starts[k], push, windows)], axis=1)
+        np.testing.assert_allclose(rims[k], speeds, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", [*REMEMBERING, *OTHERS])
+def test_an_effect_that_no_vector_has_is_left_out_and_changes_nothing(windows, name):
+    vectors = np.stack([VECTOR, vector_with(name)])
+    for vector, found in zip(vectors, pushes_of(vectors, windows), strict=True):
+        whole = _push(vector, windows)  # runs every loop
+        size = [np.abs(part).max() for part in whole]
+        for part, other, largest in zip(found, whole, size, strict=True):
+            np.testing.assert_allclose(part, other, atol=1e-9 * max(largest, 1.0))
+    plain, moved = (np.asarray(push.mean) for push in pushes_of(vectors, windows))
+    assert np.any(plain != moved) == (name in (*REMEMBERING, "transport_delay"))
