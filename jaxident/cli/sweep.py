@@ -75,12 +75,9 @@ def _run_all(plan, out, scheduler):
 
 
 def _run_one(plan, number, out):
-    import numpy as np
-
     from jaxident.errors import InputError
     from jaxident.files.atomic import make_folder
     from jaxident.files.logs import write_log
-    from jaxident.log import make_log
     from jaxident.plot import save
     from jaxident.report.trial import draw_trial, trial_rows
     from jaxident.study.engine import run_one
@@ -95,8 +92,6 @@ def _run_one(plan, number, out):
     stem = os.path.join(out, f"trial_{number}")
     save(figure, f"{stem}.png")
     wrote(f"{stem}.png")
-    period = float(recording.robot.sample_period)
-    log = make_log(period * np.arange(len(recording.exact.x)), *recording.command, *recording.measured)
-    write_log(log, f"{stem}.csv")
+    write_log(recording.log(), f"{stem}.csv")
     wrote(f"{stem}.csv")
     tell_origin(f"{stem}.csv", origin(f"trial_{number}.csv"))

@@ -32,7 +32,7 @@ _PART = r"(?:[\w-]++|\"[^\"\n]*+\"|'[^'\n]*+')"
 _DEEP_KEY = re.compile(rf"(?<![\w-])(?:{_PART}[ \t]*+\.[ \t]*+){{{DEEPEST_KEY + 1}}}")
 _NEEDED = ("seeds", "noise", "robots", "estimators")
 _FREE = ("name", "excitations", "amplitude", "samples", "period", "effects", "hold", "heading_per_position",
-         "correlation_time", "chunk")  # fmt: skip
+         "correlation_time", "chunk", "runs")  # fmt: skip
 
 
 def read_study(path: Source, *, seed: int = 0) -> Study:
@@ -90,7 +90,7 @@ def study_from_dict(content: Any, name: str = "study", *, seed: int = 0) -> Stud
         "effects": _if_given(found["effects"], take_axis, f"{name}: effects"),
         "samples": _axis(found["samples"], _whole, f"{name}: samples"),
         **{key: _axis(found[key], take_number, f"{name}: {key}") for key in ("amplitude", "period")},
-        **{key: _if_given(found[key], _whole, f"{name}: {key}") for key in ("hold", "chunk")},
+        **{key: _if_given(found[key], _whole, f"{name}: {key}") for key in ("hold", "chunk", "runs")},
         **{
             key: _if_given(found[key], take_number, f"{name}: {key}")
             for key in ("heading_per_position", "correlation_time")

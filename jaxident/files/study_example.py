@@ -18,6 +18,7 @@ amplitude = [1.0]                               # largest command
                             # (`jaxident effects` lists them); several effects in one { } act together
 
 hold = 5                    # samples that a level of the excitation lasts
+# runs = 3                  # runs of a trial, each from rest under commands of its own; default: 1
 heading_per_position = 10.0 # heading noise [rad] for each metre of position noise
 # correlation_time = 0.5    # of the camera's noise [s]; default: white
 # chunk = 2000              # trials that are computed and stored together: bounds the memory

@@ -6,7 +6,6 @@ import numpy as np
 
 from jaxident import plot
 from jaxident.array_types import Increment
-from jaxident.log import make_log
 from jaxident.plot.names import plain
 from jaxident.robot.model import DIFFERENCE_ORDER
 from jaxident.robot.path_length import path_length
@@ -31,12 +30,9 @@ def trial_rows(study: Study, number: int, outcome: Outcome) -> list[tuple[str, .
 
 
 def draw_trial(study: Study, number: int, recording: Recording, outcome: Outcome) -> Any:
-    """A figure of one trial: path, commands and increments of its first rows, errors of its estimates."""
-    period = float(recording.robot.sample_period)
-    exact, measured = (
-        make_log(period * np.arange(len(pose.x)), *recording.command, *pose)
-        for pose in (recording.exact, recording.measured)
-    )
+    """A figure of one trial: path, commands and increments of the first rows of its first run, errors of its
+    estimates."""
+    exact, measured = (recording.log(exact).runs()[0] for exact in (True, False))
     figure, axes = plot.figure(4, 1, size=(6.9, 10.5), heights=(2.2, 1.0, 1.0, 1.4))
     plot.path(measured, ax=axes[0])
     axes[0].plot(exact.x, exact.y, color="black", linewidth=0.6, linestyle="--")
@@ -55,8 +51,9 @@ def draw_trial(study: Study, number: int, recording: Recording, outcome: Outcome
 def _title(study: Study, number: int) -> str:
     index, entries = np.unravel_index(number, study.shape), coordinates(study)
     at = {axis: entries[axis].values[k] for axis, k in zip(study.axes, index, strict=True)}
+    rows = f"{at['samples']} rows" + (f", first of {study.runs} runs" if study.runs > 1 else "")
     effect = f"effects {at['effect']}, " if "effect" in at else ""
     return (
-        f"trial {number}: {at['excitation']}, {at['samples']} rows, {at['robot']}, {at['period']:.4g} s, "
+        f"trial {number}: {at['excitation']}, {rows}, {at['robot']}, {at['period']:.4g} s, "
         f"amplitude {at['amplitude']:g},\n{effect}camera noise {1e3 * at['noise']:.4g} mm, seed {at['seed']}"
     )

@@ -60,23 +60,25 @@ def _deviation(study: Study, place: tuple[int, ...], slip: bool) -> np.ndarray:
     law = Law(
         where.robot.coupling is not None, study.correlation_time is not None, slip, where.robot.wheels is not None
     )
-    variances = np.asarray(_variances(base, where, commands(base, where, kind, rows, study.hold), law))
+    sent = commands(base, where, kind, rows, study.hold, study.runs)
+    variances = np.asarray(_variances(base, where, sent, law, study.runs))
     return np.sqrt(np.mean(np.where(variances > 0.0, variances, np.nan), axis=0))
 
 
-@functools.partial(jax.jit, static_argnames="law")
-def _variances(base: Array, where: Cell, command: Wheels, law: Law) -> Array:
-    """Variances (trials, 12) by the information in each trial."""
+@functools.partial(jax.jit, static_argnames=("law", "count"))
+def _variances(base: Array, where: Cell, command: Wheels, law: Law, count: int) -> Array:
+    """Variances (trials, 12) by the information in each trial of `count` runs."""
 
     def one(cell: Cell, command: Wheels) -> Any:
         robot = draw_robot(seed_keys(base, cell)[0], cell)
         slips = (0.0, 0.0) if cell.robot.slip is None else cell.robot.slip
         noise = Noise(cell.position, cell.heading, cell.correlation_time, *slips)
         vector = to_vector(Robot(require_physical(robot), robot.dead_zone, noise, robot.wheels), law)
-        blank = jnp.zeros((1, *jnp.shape(command.right)))
+        command = Wheels(*(u.reshape(count, -1) for u in command))
+        blank = jnp.zeros(command.right.shape)
         every = blank == 0.0
         wheels, turning = (Wheels(blank, blank), Wheels(every, every)) if law.wheels else (None, None)
-        runs = Runs(cell.period, Wheels(*(u[None] for u in command)), Pose(blank, blank, blank), every, wheels, turning)
+        runs = Runs(cell.period, command, Pose(blank, blank, blank), every, wheels, turning)
         covariance = bound_covariance(vector, jnp.asarray(AT_REST, float), runs, law)
         return jnp.diagonal(difference_covariance(vector, covariance, cell.period, law))
 

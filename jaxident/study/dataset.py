@@ -145,7 +145,9 @@ def describe(study: Study) -> dict[str, Any]:
     estimators = [{"name": one.name, "method": one.method, **settings_of(one)} for one in study.estimators]
     plain |= {"robots": robots, "estimators": estimators}
     added = [{"name": one.name, "effects": _sizes(one.effects)} for one in study.effects]
-    return {key: value for key, value in plain.items() if key != "effects"} | ({"effects": added} if added else {})
+    # what a study does not use is left out, as older versions did: their folders go on
+    unused = {"effects"} | ({"runs"} if study.runs == 1 else set())
+    return {key: value for key, value in plain.items() if key not in unused} | ({"effects": added} if added else {})
 
 
 def _parts(model: Any) -> dict[str, Any]:

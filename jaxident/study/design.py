@@ -20,7 +20,7 @@ PARTS = ("rate", "gain", "coupling", "dead_zone")
 """The parts of a robot that a study may scale or spread."""
 
 SMALLEST_RUN, LONGEST_RUN = 20, 10_000_000
-"""Rows of a run: the longest lasts a day at 100 Hz."""
+"""Rows of a run, and of all runs of a trial: the longest lasts a day at 100 Hz."""
 LONGEST_NAME = 300
 """Characters of a name; a picture grows with it."""
 MOST_TRIALS = 100_000_000
@@ -67,6 +67,8 @@ class Study(NamedTuple):
         chunk: trials computed and stored together, which bounds the memory.
         effects: sets that are added to every robot in turn, under the same random numbers. Without them robots have
             their own effects alone, and the trials have no axis `effect`.
+        runs: how many a trial has, each of `samples` rows from rest under commands of its own. Estimators see all of
+            them, as one log.
     """
 
     robots: tuple[Candidate, ...]
@@ -84,6 +86,7 @@ class Study(NamedTuple):
     name: str = "study"
     chunk: int = CHUNK
     effects: tuple[EffectSet, ...] = ()
+    runs: int = 1
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -123,7 +126,7 @@ def check_study(study: Study, where: str = "study") -> None:
     """InputError naming the key, what is wrong and what would be right; `where` is what the line calls the study."""
     _check_name(study.name, f"{where}: name")
     _check_axes(study, where)
-    for key, most in (("seeds", MOST_TRIALS), ("hold", LONGEST_RUN), ("chunk", MOST_TRIALS)):
+    for key, most in (("seeds", MOST_TRIALS), ("hold", LONGEST_RUN), ("chunk", MOST_TRIALS), ("runs", LONGEST_RUN)):
         if not 1 <= getattr(study, key) <= most:
             raise InputError(f"{where}: {key}: is {getattr(study, key)}; it should be at least 1 and at most {most}")
     if study.trials > MOST_TRIALS:
@@ -140,7 +143,7 @@ def check_study(study: Study, where: str = "study") -> None:
     for one in study.effects:
         _check_set(one, study.robots, f"{where}: effects: {one.name!r}", duration)
     for choice in study.estimators:
-        check_choice(choice, f"{where}: estimator {choice.name!r}")
+        check_choice(choice, study.runs, f"{where}: estimator {choice.name!r}")
 
 
 def _check_axes(study: Study, where: str) -> None:
@@ -160,8 +163,10 @@ def _check_axes(study: Study, where: str) -> None:
         raise InputError(f"{where}: noise: {min(study.noise):g} is negative; it is a standard deviation in metres")
     if min(study.samples) < SMALLEST_RUN:
         raise InputError(f"{where}: samples: {min(study.samples)} is too short; a run has at least {SMALLEST_RUN} rows")
-    if max(study.samples) > LONGEST_RUN:
-        raise InputError(f"{where}: samples: {max(study.samples)} is too long; a run has at most {LONGEST_RUN} rows")
+    if max(study.samples) * study.runs > LONGEST_RUN:
+        of_all = f" in {study.runs} runs" if study.runs > 1 else ""
+        told = f"samples: {max(study.samples)}{of_all} is too long"
+        raise InputError(f"{where}: {told}; a trial has at most {LONGEST_RUN} rows")
 
 
 def _check_axis(values: Sequence[Any], where: str) -> None:

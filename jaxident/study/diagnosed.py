@@ -16,7 +16,7 @@ from jaxident.diagnosis.diagnose import Diagnosis, diagnose
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.coordinates import NOMINAL
 from jaxident.errors import InputError, WorkError
-from jaxident.log import Log, make_log
+from jaxident.log import Log
 from jaxident.robot.difference import to_difference
 from jaxident.robot.drive import Physical
 from jaxident.robot.model import DIFFERENCE_ORDER, Model, difference_vector, require_physical
@@ -49,19 +49,13 @@ def with_diagnoses(study: Study, outcome: Outcome, recording: Callable[[int], Re
     estimate, deviation, reason = (np.array(part) for part in (outcome.estimate, outcome.deviation, outcome.reason))
     naming = [[NO_NAMING] * len(study.estimators) for _ in estimate]
     for trial in range(len(estimate)):
-        log = log_of(recording(trial))
+        log = recording(trial).log()
         for place in study.diagnoses:
             found, naming[trial][place] = diagnose_log(log, settings_of(study.estimators[place])["horizon"])
             estimate[trial, place], deviation[trial, place], reason[trial, place] = found
     told = Naming(*(np.array([[one[k] for one in row] for row in naming]) for k in range(len(Naming._fields))))
     told = told._replace(verdict=told.verdict.astype("i1"))
     return Outcome(estimate, deviation, outcome.truth, reason, **told._asdict())
-
-
-def log_of(made: Recording) -> Log:
-    """What a camera, and wheels where they are measured, tell of a trial."""
-    t = float(made.robot.sample_period) * np.arange(len(made.measured.x))
-    return make_log(t, *made.command, *made.measured, None, *(made.wheels or ()))
 
 
 def diagnose_log(log: Log, horizon: float) -> tuple[Finding, Naming]:

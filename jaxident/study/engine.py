@@ -36,7 +36,7 @@ STATIC = ("excitation", "samples")
 """Axes that the compiled program is fixed to: no chunk spans two of their entries."""
 
 _KINDS = tuple(EXCITATIONS)
-_record = jax.jit(record, static_argnames="effects")
+_record = jax.jit(record, static_argnames=("effects", "runs"))
 
 
 class Piece(NamedTuple):
@@ -107,7 +107,7 @@ def run_locally(study: Study, numbers: Sequence[int]) -> Iterator[tuple[int, Out
 
 def block_size(study: Study) -> int:
     """Trials of a block: fixed for a study, so that the program is compiled once for each run length."""
-    each = len(study.estimators) * (TRIAL_BYTES + ROW_BYTES * max(study.samples))
+    each = len(study.estimators) * (TRIAL_BYTES + ROW_BYTES * max(study.samples) * study.runs)
     size = trials_at_once(BLOCK, each)
     return min(size, math.prod(chunk_shape(study))) * jax.local_device_count()
 
@@ -152,12 +152,13 @@ def _recording(study: Study, place: np.ndarray) -> Recording:
     where = cells(study, place[:, None])
     command = Wheels(*(u[0] for u in _commands(study, place[:, None], where)))
     cell = jax.tree.map(lambda leaf: leaf[0], where)
-    return jax.tree.map(np.asarray, _record(jax.random.key(study.seed), cell, command, study.effect_names))
+    made = _record(jax.random.key(study.seed), cell, command, study.effect_names, study.runs)
+    return jax.tree.map(np.asarray, made)._replace(runs=study.runs)
 
 
 def _commands(study: Study, index: np.ndarray, where: Cell) -> Wheels:
     kind, samples = study.excitations[index[0, 0]], study.samples[index[1, 0]]
-    return commands(jax.random.key(study.seed), where, kind, samples, study.hold)
+    return commands(jax.random.key(study.seed), where, kind, samples, study.hold, study.runs)
 
 
 def _program(study: Study, size: int) -> Callable[[int], Callable[..., Outcome]]:
@@ -165,7 +166,7 @@ def _program(study: Study, size: int) -> Callable[[int], Callable[..., Outcome]]
     cell = cells(study, np.zeros((len(study.axes), size), int))
     leaves, tree = jax.tree.flatten(cell)
     shapes = tuple((leaf.shape, str(leaf.dtype)) for leaf in leaves)
-    return lambda samples: _compiled(Plan(samples, study.estimators, study.effect_names), tree, shapes)
+    return lambda samples: _compiled(Plan(samples, study.runs, study.estimators, study.effect_names), tree, shapes)
 
 
 @functools.lru_cache(maxsize=64)
@@ -173,7 +174,7 @@ def _compiled(plan: Plan, tree: Any, shapes: tuple[tuple[tuple[int, ...], str], 
     """Compiled once for all threads, ahead of the first call: threads that come first would each compile it."""
     sharding = _sharding()
     leaves = [jax.ShapeDtypeStruct(shape, dtype, sharding=sharding) for shape, dtype in shapes]
-    command = jax.ShapeDtypeStruct((shapes[0][0][0], plan.samples), float, sharding=sharding)
+    command = jax.ShapeDtypeStruct((shapes[0][0][0], plan.runs * plan.samples), float, sharding=sharding)
     program = jax.jit(jax.vmap(functools.partial(run_trial, plan), in_axes=(None, 0, 0)))
     base = jax.eval_shape(lambda: jax.random.key(0))
     return program.lower(base, jax.tree.unflatten(tree, leaves), Wheels(command, command)).compile()

@@ -42,6 +42,7 @@ from jaxident.study.sight import (
     Method,
     Setting,
     Sight,
+    places_of_rows,
 )
 
 UNKNOWNS_OF_ONE_CHANNEL = 6
@@ -59,10 +60,12 @@ def runs_alone(choice: Choice) -> bool:
     return METHODS[choice.method].alone
 
 
-def check_choice(choice: Choice, where: str) -> None:
-    """InputError for an unknown method or setting, or a value that is not right."""
+def check_choice(choice: Choice, runs: int, where: str) -> None:
+    """InputError for an unknown method or setting, a value that is not right, or more runs than a method takes."""
     if choice.method not in METHODS:
         raise InputError(f"{where}: method: {choice.method!r} is not one of {', '.join(METHODS)}")
+    if runs > 1 and METHODS[choice.method].one_run:
+        raise InputError(f"{where}: method: {choice.method} takes one run; set `runs` to 1, or take another method")
     known = METHODS[choice.method].settings
     for key, value in choice.settings:
         if key not in known:
@@ -71,10 +74,13 @@ def check_choice(choice: Choice, where: str) -> None:
             raise InputError(f"{where}: {key}: is {value!r}; {known[key].right}")
 
 
-def see(command: Wheels, pose: Pose, period: Array, wheels: Wheels | None = None) -> Sight:
-    """What estimators see of commands, measured poses and, if any, wheel speeds (samples,) at an even period [s]."""
-    rows = jnp.arange(len(pose.x))
-    log = Log(rows * period, *command, *pose, jnp.zeros_like(rows))
+def see(command: Wheels, pose: Pose, period: Array, wheels: Wheels | None = None, runs: int = 1) -> Sight:
+    """What estimators see of commands, measured poses and, if any, wheel speeds (rows,) of some runs of one length, one
+    after the other, at an even period [s]."""
+    run, row = map(jnp.asarray, places_of_rows(runs, len(pose.x)))
+    log = Log(row * period, *command, *pose, run)
+    # without seams no masks are needed, which makes the recursion faster
+    whole = complete_observations(command, path_length(pose)) if runs == 1 else tail(observe_log(log), 1)
 
     @functools.cache
     def setup(count: int, reading: str, d_max_share: float) -> Setup:
@@ -82,7 +88,7 @@ def see(command: Wheels, pose: Pose, period: Array, wheels: Wheels | None = None
         return initialise(early, d_max=d_max_share * largest, reading=reading)
 
     largest = jnp.max(jnp.abs(jnp.stack(command)))
-    return Sight(log, complete_observations(command, path_length(pose)), setup, largest, wheels)
+    return Sight(log, whole, setup, largest, wheels, runs)
 
 
 def estimate(choice: Choice, sight: Sight, moves: Array) -> Finding:
@@ -117,12 +123,13 @@ def recursively(sight: Sight, settings: dict[str, Any]) -> Finding:
         return _finding(first, setup, variance, batch_covariance)
 
     def body(carry, sample):
-        estimate, squares = carry
+        estimate, squares, used = carry
         estimate, info = recursive.absorb(estimate, sample)
-        return (estimate, squares + jnp.stack([e * e / s for e, s in zip(info.error, info.scale, strict=True)])), None
+        new = jnp.stack([e * e / s for e, s in zip(info.error, info.scale, strict=True)])
+        return (estimate, squares + jnp.where(info.used, new, 0.0), used + info.used), None
 
-    (last, squares), _ = jax.lax.scan(body, (first, jnp.zeros(2)), late)
-    return _finding(last, setup, squares / len(late.command.right))
+    (last, squares, used), _ = jax.lax.scan(body, (first, jnp.zeros(2), 0), late)
+    return _finding(last, setup, squares / jnp.maximum(used, 1))
 
 
 def likelihood(sight: Sight, settings: dict[str, Any]) -> Finding:
@@ -130,8 +137,8 @@ def likelihood(sight: Sight, settings: dict[str, Any]) -> Finding:
     wheels, in physical parameters."""
     log, wheels = sight.log, sight.wheels if settings["wheels"] else None
     law, period = Law(settings["coupling"], wheels=wheels is not None), log.t[1] - log.t[0]
-    command, pose, wheels = jax.tree.map(lambda column: column[None], (log.command, log.pose, wheels))
-    every = jnp.ones((1, len(log.t)), bool)
+    command, pose, wheels = jax.tree.map(lambda column: column.reshape(sight.runs, -1), (log.command, log.pose, wheels))
+    every = jnp.ones(command.right.shape, bool)
     runs = Runs(period, command, pose, every, wheels, None if wheels is None else Wheels(every, every))
     fit = fit_runs(runs, settings["d_max_share"] * sight.largest, law)
     covariance = difference_covariance(to_vector(fit.robot, law), fit.covariance, period, law)
@@ -209,7 +216,7 @@ METHODS = {
         _PAPER | {"forgetting": Setting(1.0, _number(0.0, 1.0), "a number above 0 and at most 1")},
     ),
     "key-term-least-squares": Method(key_terms, _WHOLE),
-    "instrumental-variables": Method(instrumental, _WHOLE),
+    "instrumental-variables": Method(instrumental, _WHOLE, one_run=True),
     BEST: Method(likelihood, _WHOLE | _POSES, alone=True),
     DIAGNOSE: Method(None, {"horizon": Setting(0.0, _seconds, "0 (the default rule) or seconds")}),
 }

@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from jaxident.array_types import Array, Wheels
 from jaxident.estimation.increments.initialise import Setup
 from jaxident.estimation.increments.observations import Observations
@@ -22,11 +24,12 @@ FOUND, AT_REST, NO_START, NOT_FINITE, NOT_ARRIVED, REFUSED = range(6)
 
 
 class Sight(NamedTuple):
-    """What an estimator sees of a trial: one even run without gaps, arrays (samples,), and what can be had from it.
+    """What an estimator sees of a trial: even runs without gaps, one after the other, arrays (rows,), and what can be
+    had from them.
 
     observations leave out the first sample, whose command before is unknown. setup(rows, reading, d_max) gives the
     start values from the first rows; estimators that ask for the same share the work. wheels: measured wheel speeds,
-    None of robots without.
+    None of robots without. runs: how many, all of one length.
     """
 
     log: Log
@@ -34,6 +37,13 @@ class Sight(NamedTuple):
     setup: Callable[[int, str, Array], Setup]
     largest: Array
     wheels: Wheels | None = None
+    runs: int = 1
+
+
+def places_of_rows(runs: int, rows: int) -> tuple[np.ndarray, np.ndarray]:
+    """Of each row (rows,) of some runs of one length, one after the other, the run and the place in it."""
+    length = rows // runs
+    return np.repeat(np.arange(runs), length), np.tile(np.arange(length), runs)
 
 
 class Finding(NamedTuple):
@@ -56,6 +66,7 @@ class Method(NamedTuple):
     """run(sight, settings) -> Finding, and the settings it takes.
 
     A method without `run` is no part of the compiled program of a trial (`study.diagnosed`).
+    one_run: whether it takes a single run only.
     alone: no two of its programs may run at once in a process. Its eigenvalues come from LAPACK, whose batched call
     hands its work to XLA's threads and waits for them, on one of these itself; with as many programs as threads, all
     wait for ever.
@@ -64,6 +75,7 @@ class Method(NamedTuple):
     run: Callable[[Sight, dict[str, Any]], Finding] | None
     settings: dict[str, Setting]
     alone: bool = False
+    one_run: bool = False
 
 
 class Choice(NamedTuple):

@@ -13,7 +13,7 @@ from jaxident.robot.drive import Physical
 from jaxident.robot.model import Effect, Model
 from jaxident.study.dataset import study_arrays
 from jaxident.study.design import Candidate, EffectSet
-from jaxident.study.diagnosed import log_of, naming_of, parameters_of
+from jaxident.study.diagnosed import naming_of, parameters_of
 from jaxident.study.engine import chunk_shape, run_one
 from jaxident.study.sight import REASONS, REFUSED, Choice
 from jaxident.study.statistics import summarise
@@ -65,7 +65,7 @@ def test_a_trial_alone_is_diagnosed_as_in_the_study(trials):
     whole = trials.isel(effect=1).squeeze()
     for name in ("estimate", "deviation", "verdict", "takes_part", "named", "alike"):
         np.testing.assert_array_equal(getattr(outcome, name), whole[name])
-    verdict, _, named, _ = naming_of(ji.diagnose(log_of(recording)))
+    verdict, _, named, _ = naming_of(ji.diagnose(recording.log()))
     assert verdict == whole["verdict"].sel(estimator="named")
     np.testing.assert_array_equal(named, whole["named"].sel(estimator="named"))
 

@@ -30,12 +30,10 @@ FEWEST = 60
 """Increments that an estimate needs."""
 MOST_CELLS = 1 << 18
 """Cells of the even grid of the search."""
-STEPS, EARLY = 14, 4
-"""Of Gauss-Newton at most, and of those without whitening."""
-ARRIVED = 1e-6
-"""Step of the offset [s] and of the logarithms of the rates at which the fit ends. No other number was tried."""
-PART = 1e-5
-"""Of a rate: the step of the derivative by its logarithm."""
+STEPS, EARLY, ARRIVED = 14, 4, 1e-6
+"""Steps of Gauss-Newton at most, those without whitening, and the step of the offset [s] and of the logarithms of the
+rates at which the fit ends; 1e-6 is the only one tried."""
+PART = 1e-5  # of a rate: the step of the derivative by its logarithm
 DOUBT = 10.0
 """Log likelihood by which an offset must lead another, one second or more away."""
 LONGEST_STEP = 0.3
@@ -181,8 +179,8 @@ def _tabulate(streams: Streams, offset: float, rates: np.ndarray) -> _Table:
     length = np.diff(at, axis=1)
 
     def moved(rate: float) -> tuple[np.ndarray, np.ndarray]:
-        found = follow_commands(streams.command_t, u, rate, at.T.ravel())  # both ends at once: the lag is slow
-        travelled, speed = (each[len(at) :] - each[: len(at)] for each in found)
+        both = follow_commands(streams.command_t, u, rate, at.T.ravel())  # at once: the lag is what takes time
+        travelled, speed = (each[len(at) :] - each[: len(at)] for each in both)
         return travelled, speed
 
     columns, by_offset, by_rate = [], [], []
