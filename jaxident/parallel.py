@@ -1,7 +1,9 @@
 """Blocks of work that fit the cache of a CPU, side by side on all its cores, or the memory of a card."""
 
+import contextlib
+import contextvars
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -9,6 +11,18 @@ import jax
 
 SMALLEST_CARD = 2 << 30
 """Bytes of a card that does not tell its memory: no card that is sold for such work has less."""
+_most_cores: contextvars.ContextVar[int | None] = contextvars.ContextVar("most_cores", default=None)
+
+
+@contextlib.contextmanager
+def at_most(cores: int | None) -> Iterator[None]:
+    """Within it `in_parallel` takes so many cores by default: one in a process beside others that fill the machine;
+    None for all."""
+    before = _most_cores.set(cores)
+    try:
+        yield
+    finally:
+        _most_cores.reset(before)
 
 
 def in_parallel(
@@ -16,21 +30,21 @@ def in_parallel(
 ) -> list[Any]:
     """The results of a compiled function on blocks of arguments, all of one shape, in their order.
 
-    One thread per core (`cores`: how many, all by default) takes the next block when it is done with one. The program
-    is compiled once and releases Python while it runs; no data pass between the blocks, so that none waits for
-    another: results are the same to the bit with any number of threads. `ahead`: whether the function is compiled
-    already. If not, the first block runs alone: threads that come first would each compile it. A graphics card takes
-    one block at a time, for each may fill its memory (`trials_at_once`).
+    One thread per core (`cores`: how many, by default all, or what `at_most` says) takes the next block when it is
+    done with one. The program is compiled once and releases Python while it runs; no data pass between the blocks, so
+    that none waits for another: results are the same to the bit with any number of threads. `ahead`: whether the
+    function is compiled already. If not, the first block runs alone: threads that come first would each compile it. A
+    graphics card takes one block at a time, for each may fill its memory (`trials_at_once`).
     """
     if cores is None:
-        cores = os.cpu_count() if card_memory() is None else 1
+        cores = _most_cores.get() or (os.cpu_count() if card_memory() is None else 1)
 
     def run(block: tuple[Any, ...]) -> Any:
         return jax.block_until_ready(function(*block))
 
     alone = 0 if ahead else 1
     first, others = [run(block) for block in blocks[:alone]], blocks[alone:]
-    if len(others) < 2:  # threads would only cost
+    if len(others) < 2 or cores == 1:  # threads would only cost
         return first + [run(block) for block in others]
     with ThreadPoolExecutor(cores) as threads:
         return first + list(threads.map(run, others))

@@ -1,10 +1,12 @@
 """Blocks in parallel against a plain loop."""
 
+import threading
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxident.parallel import in_parallel
+from jaxident.parallel import at_most, in_parallel
 
 
 def test_blocks_in_parallel_are_the_loop_in_order():
@@ -21,3 +23,16 @@ def test_a_function_that_is_not_compiled_yet_is_compiled_once():
     found = in_parallel(function, [(jnp.arange(3.0) - k,) for k in range(9)], 4, ahead=False)
     assert function._cache_size() == 1
     np.testing.assert_array_equal(found, [2.0 * (np.arange(3.0) - k) for k in range(9)])
+
+
+def test_beside_other_processes_no_more_threads_are_started():
+    def threads():
+        return set(in_parallel(lambda _: threading.get_ident(), [(k,) for k in range(8)]))
+
+    with at_most(1):
+        assert threads() == {threading.get_ident()}
+        with at_most(2):
+            assert threading.get_ident() not in threads()
+        assert threads() == {threading.get_ident()}
+    with at_most(None):
+        assert threads()

@@ -13,7 +13,7 @@ from jaxident.array_types import Wheels
 from jaxident.effects.catalogue import to_vector
 from jaxident.effects.discovered import IDLE, Laws, laws_of
 from jaxident.numerics import require_float64
-from jaxident.parallel import in_parallel, trials_at_once
+from jaxident.parallel import at_most, in_parallel, trials_at_once
 from jaxident.robot.excitation import EXCITATIONS
 from jaxident.robot.model import Model, require_physical
 from jaxident.robot.wheel_sensor import WheelSensor
@@ -83,7 +83,8 @@ def run_chunk(study: Study, piece: Piece, cores: int | None = None) -> Outcome:
     """
     require_float64("study")
     index = np.indices(piece.shape).reshape(len(piece.shape), -1) + np.array([[part.start] for part in piece.cut])
-    outcome = with_diagnoses(study, _run(study, index, cores), lambda trial: _recording(study, index[:, trial]))
+    with at_most(cores):
+        outcome = with_diagnoses(study, _run(study, index, cores), lambda trial: _recording(study, index[:, trial]))
     return jax.tree.map(lambda part: part.reshape(*piece.shape, *part.shape[1:]), outcome)
 
 
