@@ -121,7 +121,8 @@ def _counts(study: Study, summary: xarray.Dataset) -> str:
     failed = int(summary["failures"].sum())
     every = study.trials * len(study.estimators)
     axes = ", ".join(f"{n} {_plural(axis, n)}" for axis, n in zip(study.axes, study.shape, strict=True) if n > 1)
-    return f"{study.trials} trials ({axes or 'one each'}), {every} estimates, {failed} of them failed."
+    runs = f" of {study.runs} runs each" if study.runs > 1 else ""
+    return f"{study.trials} trials{runs} ({axes or 'one each'}), {every} estimates, {failed} of them failed."
 
 
 def _plural(axis: str, count: int) -> str:

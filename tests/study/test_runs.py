@@ -9,6 +9,7 @@ from support.studies import ROBOT, SMALL
 
 import jaxident as ji
 from jaxident.errors import InputError
+from jaxident.report.sweep import write_study
 from jaxident.robot.model import Effect
 from jaxident.robot.noise import Noise
 from jaxident.study import bound
@@ -16,6 +17,7 @@ from jaxident.study.dataset import describe, study_arrays
 from jaxident.study.design import Candidate, EffectSet, check_study
 from jaxident.study.engine import run_one
 from jaxident.study.sight import FOUND, Choice
+from jaxident.study.statistics import summarise
 from jaxident.study.synthetic import simulate_runs
 
 PAYLOAD = (Effect("payload_change", {"ratio": 0.5, "instant": 4.0}),)
@@ -49,11 +51,15 @@ def test_effects_go_on_from_run_to_run():
     assert away[2] > 1e-3
 
 
-def test_every_method_sees_all_runs_and_no_seam():
+def test_every_method_sees_all_runs_and_no_seam(tmp_path):
     """Runs begin at the origin: a seam taken for motion would throw an estimate away by metres."""
     methods = ("batch", "recursive", "key-term-least-squares", "maximum-likelihood")
     chosen = tuple(Choice(m, m, (("coupling", True),) if m == "maximum-likelihood" else ()) for m in methods)
-    found = study_arrays(PLAIN._replace(estimators=chosen, samples=(150,), noise=(1e-6,), seeds=2, runs=4)).squeeze()
+    study = PLAIN._replace(estimators=chosen, samples=(150,), noise=(1e-6,), seeds=2, runs=4)
+    whole = study_arrays(study)
+    write_study(study, whole, summarise(whole), tmp_path / "page.html")
+    assert "2 trials of 4 runs each" in (tmp_path / "page.html").read_text()
+    found = whole.squeeze()
     assert np.all(found["reason"] == FOUND)
     sure = ["alpha_1", "alpha_2", "dead_zone_r", "dead_zone_l"]
     error = np.abs(found["estimate"] - found["truth"]).sel(parameter=sure)
