@@ -30,6 +30,10 @@ from jaxident.study.estimators import estimate, see
 from jaxident.study.sight import Choice, places_of_rows
 
 
+FURTHER_RUN = 1 << 24
+"""Added to the number of a run before it is folded into a key: the draws within a run fold in small numbers."""
+
+
 class Robot(NamedTuple):
     """Parts of a robot: rate (2,), gain (2, 2), coupling (2,) or None, dead_zone (2,), slip (2,) along and in heading
     or None; spread (4,): the largest relative departure of each part, drawn anew for each seed; effects (parameters,):
@@ -115,7 +119,7 @@ def seed_keys(base: Array, cell: Cell) -> tuple[Array, Array, Array]:
 
 def _keys_of_runs(key: Array, runs: int) -> Array:
     """The key of the first run, and one of each further run."""
-    further = jax.vmap(lambda run: jax.random.fold_in(key, run))(jnp.arange(1, runs))
+    further = jax.vmap(lambda run: jax.random.fold_in(key, FURTHER_RUN + run))(jnp.arange(1, runs))
     return jnp.concatenate([key[None], further])
 
 
