@@ -29,7 +29,6 @@ from jaxident.robot.wheel_sensor import measure_wheels
 from jaxident.study.estimators import estimate, see
 from jaxident.study.sight import Choice, places_of_rows
 
-
 FURTHER_RUN = 1 << 24
 """Added to the number of a run before it is folded into a key: the draws within a run fold in small numbers."""
 
