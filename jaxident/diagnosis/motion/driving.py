@@ -20,9 +20,9 @@ from jaxident.effects.fast_input import PUSHING, REMEMBERING, Push
 from jaxident.parallel import in_parallel
 from jaxident.programs import kept_program
 
-AT_ONCE = 4
-"""Vectors of one call. On one core 24, 40, 80 and 160 windows then take 0.46, 0.57, 0.54 and 0.88 of the time a vector;
-with eight vectors 0.39, 0.53, 0.47 and 1.02."""
+AT_ONCE, FEW_WINDOWS = 4, 160
+"""Vectors of one call where there are so many windows at most. On one core 24, 40, 80 and 160 windows then take 0.46,
+0.57, 0.54 and 0.88 of the time a vector; with eight vectors 0.39, 0.53, 0.47 and 1.02. More windows were not tried."""
 FEW_PIECES = 16
 """Pieces that windows are cut from, at most, where pushes of several vectors take one call. A loop over the rows of 3,
 4 and 16 pieces then takes 1.1, 1.0 and 2.7 times as long as for one vector, over 268 four times (one core; none
@@ -34,9 +34,8 @@ _NEUTRAL = neutral_vector(np.zeros(len(NOMINAL)))
 
 
 def each_of(program: Callable[..., Any]) -> Callable[..., Any]:
-    """A program of one vector (SIZE,), starts (5, windows), push, windows and laws as one of AT_ONCE of the first
-    three: arrays (AT_ONCE, ...) and a list of pushes. It keeps the name, by which `kept_program` tells programs
-    apart."""
+    """A program of one vector (SIZE,), starts (5, windows), push, windows and laws as one of several of the first
+    three: arrays (batch, ...) and a list of pushes. It keeps the name, by which `kept_program` tells programs apart."""
 
     @functools.wraps(program)
     def of_several(vectors: Array, starts: Array, push: list[Push], windows: Windows, laws: Laws | None) -> Any:
@@ -53,7 +52,8 @@ def run_each(several: Callable[..., Any], vectors: Array, starts: Array, windows
     """
     windows, count = jax.tree.map(jnp.asarray, windows), len(vectors)
     push = pushes_of(vectors, windows)
-    blocks = [np.minimum(np.arange(k, k + AT_ONCE), count - 1) for k in range(0, count, AT_ONCE)]
+    size = AT_ONCE if len(windows.run) <= FEW_WINDOWS else 1
+    blocks = [np.minimum(np.arange(k, k + size), count - 1) for k in range(0, count, size)]
     lanes = [(vectors[block], starts[block], [push[k] for k in block], windows, laws) for block in blocks]
     found = in_parallel(several, lanes, ahead=False)
     return jax.tree.map(lambda *parts: np.concatenate(parts)[:count], *found)

@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 from support.small_robot import VECTOR, windows_of
 
-from jaxident.diagnosis.motion.driving import AT_ONCE, pushes_of
+from jaxident.diagnosis.motion.driving import AT_ONCE, FEW_WINDOWS, pushes_of
 from jaxident.diagnosis.motion.linear import follow
 from jaxident.diagnosis.motion.paths import push_of, residuals, rolled
 from jaxident.diagnosis.motion.rims import rim_speeds
+from jaxident.diagnosis.motion.windows import take
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.coordinates import PLACES, from_catalogue
 from jaxident.effects.fast_input import REMEMBERING
@@ -34,8 +35,11 @@ def starts_of(count, windows) -> np.ndarray:
     return 0.1 * np.random.default_rng(count).normal(size=(count, 5, len(windows.run)))
 
 
-@pytest.mark.parametrize("count", [1, AT_ONCE, AT_ONCE + 1, 2 * AT_ONCE - 1])
-def test_vectors_side_by_side_are_those_one_after_the_other(windows, count):
+@pytest.mark.parametrize(("count", "copies"), [(1, 1), (AT_ONCE, 1), (AT_ONCE + 1, 1), (2 * AT_ONCE - 1, 1), (2, 7)])
+def test_vectors_side_by_side_are_those_one_after_the_other(windows, count, copies):
+    """Seven copies of the windows are so many that a call takes one vector."""
+    windows = take(windows, np.tile(np.arange(len(windows.run)), copies))
+    assert (len(windows.run) > FEW_WINDOWS) == (copies > 1)
     names = (OTHERS * 2)[:count]
     vectors, starts = np.stack([vector_with(name) for name in names]), starts_of(count, windows)
     found, rims = follow(vectors, starts, windows), rim_speeds(vectors, starts, windows)
