@@ -15,6 +15,7 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.causes.columns import Table, answers_of, tabulate
 from jaxident.diagnosis.causes.discrepancy import UNEXPLAINED, Rest
 from jaxident.diagnosis.causes.discrepancy_basis import WORTH
+from jaxident.diagnosis.causes.ends import misses, preferred
 from jaxident.diagnosis.causes.evidence import worth
 from jaxident.diagnosis.causes.moves import Move, better, fit_options, ranked, stands
 from jaxident.diagnosis.causes.search import MOST_EFFECTS, best_set
@@ -78,9 +79,9 @@ def search(windows: Windows, nominal: Solution, without: Collection[str] = (), l
     given stays as it is.
 
     The search begins at white noise. Where its end leaves something, a second search begins at noise as the nominal fit
-    leaves it. The end with the higher log evidence is taken. A nominal model misses a real robot by twenty times the
-    camera's error, and a search that takes all of that for effects may lose its way. Where both ends are worse than
-    no effect at all, no effect is named. Where the robot without effects coasts the first end is given back: its rates
+    leaves it. The end with the higher log evidence is taken, unless the other surely foretells the poses better
+    (`ends.preferred`). A nominal model misses a real robot by twenty times the camera's error, and a search that takes
+    all of that for effects may lose its way. Where both ends are worse than no effect at all, no effect is named. Where the robot without effects coasts the first end is given back: its rates
     are to be held, and the search made again (`finding.find_effects`).
     """
     begin, sized, without = Move(nominal, (), -nominal.cost), law is None, {*without, *untold(windows)}
@@ -97,7 +98,8 @@ def search(windows: Windows, nominal: Solution, without: Collection[str] = (), l
     ends = [each for each in ends if not each.worse_than_none]
     if not ends:
         ends = [climb(windows, nominal, begin, law, COORDINATES, sized, memory_last=False)]
-    return max(ends, key=lambda each: each.log_evidence)
+    missed = [misses(each.settled.now.fit, windows) for each in ends]
+    return ends[preferred([each.log_evidence for each in ends], missed)]
 
 
 def climb(

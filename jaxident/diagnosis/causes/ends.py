@@ -1,0 +1,61 @@
+"""Which of several ends of a search is taken, where a search was made from several beginnings.
+
+Log evidence alone does not tell. A noise law with much slip, and terms that the corrected model lacks, may explain
+poses as well as effects do. On a Husky's log two ends differed by 37 in 41000. The one with more evidence missed unseen
+runs by 0.50 m within a second, the other by 0.15 m. So ends are asked what a user asks of the model: to foretell poses.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from jaxident.array_types import Array
+from jaxident.diagnosis.fit.refit import Solution
+from jaxident.diagnosis.motion.linear import START_STATES
+from jaxident.diagnosis.motion.windows import Windows
+from jaxident.diagnosis.noise.law import first_law
+from jaxident.diagnosis.preparation.prepare import BURN
+
+SURELY = 1.645
+"""Standard errors by which an end must foretell better than that with more evidence: by chance in one case of twenty.
+No other value was tried."""
+KNOWN = 1e-9
+"""Part of the mean information on start states that every window has besides: a window that tells nothing of a start
+speed leaves it as it is. No other value was tried."""
+
+
+def preferred(log_evidence: Sequence[float], missed: Sequence[Array]) -> int:
+    """The place of the end with the highest log evidence, or of one that surely foretells better.
+
+    missed: of each end, what `misses` says of the same windows (windows,). One end surely foretells better than
+    another if the mean of the differences is more than SURELY standard errors below zero, or if the other foretells
+    nothing finite somewhere that it does not.
+    """
+    best = int(np.argmax(log_evidence))
+    for k, own in enumerate(missed):
+        lost, gained = (int(np.sum(np.isposinf(each))) for each in (own, missed[best]))
+        apart = (own - missed[best])[np.isfinite(own) & np.isfinite(missed[best])]
+        surely = len(apart) > 1 and np.mean(apart) < -SURELY * np.std(apart, ddof=1) / np.sqrt(len(apart))
+        if k != best and (lost < gained or (lost == gained and surely)):
+            best = k
+    return best
+
+
+def misses(fit: Solution, windows: Windows) -> np.ndarray:
+    """Mean squares (windows,) over the camera's variances by which a fit misses the poses past the first BURN rows of
+    each window, from the start state that these rows tell: by least squares, as if the camera were the only noise. NaN
+    of a window without poses there, infinite where the fit runs away."""
+    rows, count = np.shape(windows.seen)
+    camera = first_law(windows)
+    weight = np.asarray(windows.seen, float).T[:, :, None] / np.array([camera.position, camera.position, camera.heading])
+    residual = fit.linear.residual.reshape(count, rows, 3) * weight
+    slopes = fit.linear.starts.reshape(count, rows, 3, START_STATES) * weight[..., None]
+    early, answers = residual[:, :BURN].reshape(count, -1), slopes[:, :BURN].reshape(count, -1, START_STATES)
+    own = answers.transpose(0, 2, 1) @ answers
+    scale = np.sqrt(np.mean(np.diagonal(own, axis1=1, axis2=2), axis=0))
+    own = own + KNOWN * np.diag(scale**2)
+    moved = np.linalg.solve(own, answers.transpose(0, 2, 1) @ early[..., None])[..., 0]
+    left = residual[:, BURN:] - np.einsum("wrcs,ws->wrc", slopes[:, BURN:], moved)
+    poses = np.sum(weight[:, BURN:, 0] > 0.0, axis=1)
+    squares = np.sum(left**2, axis=(1, 2)) / np.where(poses > 0, 3.0 * poses, np.nan)
+    return np.where((poses > 0) & ~np.isfinite(squares), np.inf, squares)
