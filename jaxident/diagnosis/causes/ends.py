@@ -27,18 +27,24 @@ speed leaves it as it is. No other value was tried."""
 def preferred(log_evidence: Sequence[float], missed: Sequence[Array]) -> int:
     """The place of the end with the highest log evidence, or of one that surely foretells better.
 
-    missed: of each end, what `misses` says of the same windows (windows,). One end surely foretells better than
-    another if the mean of the differences is more than SURELY standard errors below zero, or if the other foretells
-    nothing finite somewhere that it does not.
+    missed: of each end, what `misses` says of the same windows (windows,).
     """
     best = int(np.argmax(log_evidence))
     for k, own in enumerate(missed):
-        lost, gained = (int(np.sum(np.isposinf(each))) for each in (own, missed[best]))
-        apart = (own - missed[best])[np.isfinite(own) & np.isfinite(missed[best])]
-        surely = len(apart) > 1 and np.mean(apart) < -SURELY * np.std(apart, ddof=1) / np.sqrt(len(apart))
-        if k != best and (lost < gained or (lost == gained and surely)):
+        if k != best and _foretells_better(own, missed[best]):
             best = k
     return best
+
+
+def _foretells_better(own: Array, other: Array) -> bool:
+    """Whether one end runs away in fewer windows than another, or in as many and misses the poses by less, the mean
+    difference more than SURELY standard errors."""
+    runaways = int(np.sum(np.isposinf(own))), int(np.sum(np.isposinf(other)))
+    if runaways[0] != runaways[1]:
+        return runaways[0] < runaways[1]
+    both = np.isfinite(own) & np.isfinite(other)
+    apart = own[both] - other[both]
+    return len(apart) > 1 and bool(np.mean(apart) < -SURELY * np.std(apart, ddof=1) / np.sqrt(len(apart)))
 
 
 def misses(fit: Solution, windows: Windows) -> np.ndarray:
@@ -46,8 +52,8 @@ def misses(fit: Solution, windows: Windows) -> np.ndarray:
     each window, from the start state that these rows tell: by least squares, as if the camera were the only noise. NaN
     of a window without poses there, infinite where the fit runs away."""
     rows, count = np.shape(windows.seen)
-    camera = first_law(windows)
-    weight = np.asarray(windows.seen, float).T[:, :, None] / np.array([camera.position, camera.position, camera.heading])
+    law = first_law(windows)
+    weight = np.asarray(windows.seen, float).T[:, :, None] / np.array([law.position, law.position, law.heading])
     residual = fit.linear.residual.reshape(count, rows, 3) * weight
     slopes = fit.linear.starts.reshape(count, rows, 3, START_STATES) * weight[..., None]
     early, answers = residual[:, :BURN].reshape(count, -1), slopes[:, :BURN].reshape(count, -1, START_STATES)
