@@ -10,10 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.fit.refit import Solution
+from jaxident.diagnosis.fit.refit import Data, Solution
 from jaxident.diagnosis.motion.linear import START_STATES
-from jaxident.diagnosis.motion.windows import Windows
-from jaxident.diagnosis.noise.law import first_law
+from jaxident.diagnosis.noise.law import first_law, numbers_seen
 from jaxident.diagnosis.preparation.prepare import BURN
 
 SURELY = 1.645
@@ -47,21 +46,25 @@ def _foretells_better(own: Array, other: Array) -> bool:
     return len(apart) > 1 and bool(np.mean(apart) < -SURELY * np.std(apart, ddof=1) / np.sqrt(len(apart)))
 
 
-def misses(fit: Solution, windows: Windows) -> np.ndarray:
+def misses(data: Data, fit: Solution) -> np.ndarray:
     """Mean squares (windows,) over the camera's variances by which a fit misses the poses past the first BURN rows of
-    each window, from the start state that these rows tell: by least squares, as if the camera were the only noise. NaN
-    of a window without poses there, infinite where the fit runs away."""
-    rows, count = np.shape(windows.seen)
-    law = first_law(windows)
-    weight = np.asarray(windows.seen, float).T[:, :, None] / np.array([law.position, law.position, law.heading])
-    residual = fit.linear.residual.reshape(count, rows, 3) * weight
-    slopes = fit.linear.starts.reshape(count, rows, 3, START_STATES) * weight[..., None]
-    early, answers = residual[:, :BURN].reshape(count, -1), slopes[:, :BURN].reshape(count, -1, START_STATES)
-    own = answers.transpose(0, 2, 1) @ answers
-    scale = np.sqrt(np.mean(np.diagonal(own, axis1=1, axis2=2), axis=0))
-    own = own + KNOWN * np.diag(scale**2)
-    moved = np.linalg.solve(own, answers.transpose(0, 2, 1) @ early[..., None])[..., 0]
-    left = residual[:, BURN:] - np.einsum("wrcs,ws->wrc", slopes[:, BURN:], moved)
-    poses = np.sum(weight[:, BURN:, 0] > 0.0, axis=1)
-    squares = np.sum(left**2, axis=(1, 2)) / np.where(poses > 0, 3.0 * poses, np.nan)
+    each window, foretold from these rows alone under the noise law, as `predict` does. NaN of a window without poses
+    there, infinite where the fit runs away.
+
+    The whitener is lower triangular, rows in the order of time. So the start states are least squares on the first
+    white residuals; the whitener's own part for later rows takes what is left of these back to metres and radians.
+    """
+    windows, early = data.windows, 3 * BURN
+    white = data.whitener @ np.concatenate([fit.linear.starts, fit.linear.residual[..., None]], axis=2)
+    slopes, residual = white[..., :START_STATES], white[..., START_STATES:]
+    answers = slopes[:, :early].transpose(0, 2, 1)
+    own = answers @ slopes[:, :early]
+    own = own + KNOWN * np.diag(np.mean(np.diagonal(own, axis1=1, axis2=2), axis=0))
+    left = residual - slopes @ np.linalg.solve(own, answers @ residual[:, :early])
+    seen = numbers_seen(windows)[:, early:]
+    late = data.whitener[:, early:, early:] + (1.0 - seen)[..., None] * np.eye(seen.shape[1])
+    missed = np.linalg.solve(late, left[:, early:])[..., 0]
+    law, poses = first_law(windows), np.sum(seen, axis=1)
+    missed = missed / np.tile([law.position, law.position, law.heading], len(seen[0]) // 3)
+    squares = np.sum(missed**2, axis=1) / np.where(poses > 0, poses, np.nan)
     return np.where((poses > 0) & ~np.isfinite(squares), np.inf, squares)

@@ -68,6 +68,13 @@ class Found(NamedTuple):
         return coasts(self.nominal, self.settled.data.windows, bool(self.rest.terms))
 
     @property
+    def misses(self) -> np.ndarray:
+        """By how much its effects and its likeliest law, all that the corrected model has, miss what each window
+        (windows,) shows later."""
+        now, data = self.settled.now, self.settled.data
+        return misses(whiten(now.fit, data.windows, self.likely)[0], now.fit)
+
+    @property
     def log_evidence(self) -> float:
         """Of effects, terms and noise law together."""
         now = self.settled.now
@@ -99,8 +106,7 @@ def search(windows: Windows, nominal: Solution, without: Collection[str] = (), l
     ends = [each for each in ends if not each.worse_than_none]
     if not ends:
         ends = [climb(windows, nominal, begin, law, COORDINATES, sized, memory_last=False)]
-    missed = [misses(each.settled.now.fit, windows) for each in ends]
-    return ends[preferred([each.log_evidence for each in ends], missed)]
+    return ends[preferred([each.log_evidence for each in ends], [each.misses for each in ends])]
 
 
 def climb(

@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
-from support.small_robot import nominal_fit, robot_with, windows_of
+from support.small_robot import LAW, nominal_fit, robot_with, windows_of
 
 from jaxident.diagnosis.causes.ends import misses, preferred
+from jaxident.diagnosis.causes.settled import whiten
 from jaxident.diagnosis.fit.refit import refit
-from jaxident.diagnosis.noise.law import first_law
+from jaxident.diagnosis.motion.responses import respond
+from jaxident.diagnosis.noise.law import Law, covariance, first_law
 from jaxident.diagnosis.preparation.prepare import BURN
 from jaxident.effects.coordinates import PLACES
 
@@ -15,51 +17,50 @@ LAG = "motor_lag", "time_constant"
 
 @pytest.fixture(scope="module")
 def lagging():
-    """Windows of a robot with a lag, and its fits without and with it."""
-    windows = windows_of(robot_with({LAG: 0.1}))
-    data, nominal = nominal_fit(windows)
+    """Data of a robot with a lag, and its fits without and with it."""
+    data, nominal = nominal_fit(windows_of(robot_with({LAG: 0.1})))
     vector = nominal.vector.copy()
     vector[PLACES[LAG]] = 0.1
-    return windows, nominal, refit(data, vector, nominal.starts, ("motor_lag",))
+    return data, nominal, refit(data, vector, nominal.starts, ("motor_lag",))
 
 
-def slow_misses(fit, windows):
-    """The same window by window: least squares for the start state, the mean of squares after it."""
-    rows, count = windows.seen.shape
-    law = first_law(windows)
+def slow_misses(fit, windows, law):
+    """The same window by window: generalised least squares for the start state, the mean of what is random later given
+    what was random before, the mean of squares."""
+    unit = np.array([first_law(windows).position] * 2 + [first_law(windows).heading])
+    every = covariance(law, windows, respond(np.exp(fit.vector[:2]), fit.linear.residual, windows))
     found = []
-    for k in range(count):
-        residual, slopes = fit.linear.residual[k].reshape(rows, 3), fit.linear.starts[k].reshape(rows, 3, 5)
-        seen = np.asarray(windows.seen)[:, k]
-        weight = np.array([1.0 / law.position, 1.0 / law.position, 1.0 / law.heading])
-        early, late = seen & (np.arange(rows) < BURN), seen & (np.arange(rows) >= BURN)
-        moved, *_ = np.linalg.lstsq(
-            (slopes[early] * weight[:, None]).reshape(-1, 5), (residual[early] * weight).ravel(), rcond=None
-        )
-        left = (residual[late] - slopes[late] @ moved) * weight
-        found.append(np.mean(left**2) if late.any() else np.nan)
+    for k, (own, residual, slopes) in enumerate(zip(every, fit.linear.residual, fit.linear.starts, strict=True)):
+        seen, row = np.repeat(np.asarray(windows.seen)[:, k], 3), np.repeat(np.arange(len(windows.seen)), 3)
+        early, late = np.flatnonzero(seen & (row < BURN)), np.flatnonzero(seen & (row >= BURN))
+        inverse = np.linalg.inv(own[np.ix_(early, early)])
+        start = np.linalg.solve(slopes[early].T @ inverse @ slopes[early], slopes[early].T @ inverse @ residual[early])
+        random = own[np.ix_(late, early)] @ inverse @ (residual[early] - slopes[early] @ start)
+        missed = (residual[late] - slopes[late] @ start - random) / unit[late % 3]
+        found.append(np.mean(missed**2) if len(late) else np.nan)
     return np.array(found)
 
 
-def test_what_a_fit_misses_is_what_least_squares_leave_window_by_window(lagging):
-    windows, nominal, fit = lagging
-    seen = np.array(windows.seen)
+@pytest.mark.parametrize("law", [LAW, Law(2e-4, 2e-3, (0.1, 0.5), 0.1)], ids=["white", "slip"])
+def test_what_a_fit_misses_is_what_a_filter_cannot_foretell_window_by_window(lagging, law):
+    data, *fits = lagging
+    seen = np.array(data.windows.seen)
     seen[BURN + 3 :, 0] = seen[BURN:, 1] = False  # one window ends early, one shows nothing to foretell
-    windows = windows._replace(seen=seen)
-    for each in (nominal, fit):
-        found, slow = misses(each, windows), slow_misses(each, windows)
+    windows = data.windows._replace(seen=seen)
+    for fit in fits:
+        found = misses(whiten(fit, windows, law)[0], fit)
         assert np.isnan(found[1])
-        np.testing.assert_allclose(found, slow, rtol=1e-4)
+        np.testing.assert_allclose(found, slow_misses(fit, windows, law), rtol=1e-4)
 
 
 def test_the_true_model_misses_what_camera_and_start_state_make(lagging):
-    windows, nominal, fit = lagging
-    assert 1.0 < np.mean(misses(fit, windows)) < 2.0 < np.mean(misses(nominal, windows))
+    data, nominal, fit = lagging
+    assert 1.0 < np.mean(misses(data, fit)) < 2.0 < np.mean(misses(data, nominal))
 
 
 def test_an_end_that_foretells_better_is_taken_in_spite_of_its_evidence(lagging):
-    windows, nominal, fit = lagging
-    missed = [misses(nominal, windows), misses(fit, windows)]
+    data, nominal, fit = lagging
+    missed = [misses(data, nominal), misses(data, fit)]
     assert preferred([100.0, 0.0], missed) == 1
     assert preferred([0.0, 100.0], missed) == 1
 
@@ -74,12 +75,12 @@ def test_evidence_decides_between_ends_that_foretell_about_equally():
 
 
 def test_an_end_that_runs_away_is_not_taken(lagging):
-    windows, nominal, fit = lagging
+    data, nominal, fit = lagging
     residual = np.array(nominal.linear.residual)
     residual[3] = np.nan
-    wild = misses(nominal._replace(linear=nominal.linear._replace(residual=residual)), windows)
+    wild = misses(data, nominal._replace(linear=nominal.linear._replace(residual=residual)))
     assert np.isposinf(wild[3])
-    fine = misses(fit, windows)
+    fine = misses(data, fit)
     assert preferred([9.0, 0.0], [wild, fine]) == 1
     assert preferred([0.0, 9.0], [wild, 10.0 * fine]) == 1
     assert preferred([9.0], [wild]) == 0
