@@ -27,6 +27,8 @@ from jaxident.robot.model import Model
 CREATE_TRACK = 0.258
 PERIOD = 0.05
 HUSKY_TRACK, HUSKY_WHEEL = 0.5708, 0.165
+WINDOWS = 3
+"""Windows of 2 s that the Husky has for each command. The first shows how its speeds settle, the others hardly do."""
 METHODS = ("paper", "maximum-likelihood")
 
 
@@ -109,10 +111,10 @@ def creates(data: pathlib.Path, robots: list[int], out: pathlib.Path, diagnosed:
 
 
 def husky(data: pathlib.Path, out: pathlib.Path, diagnosed: bool) -> list[dict]:
-    """The Husky: whole windows for identification, others for prediction."""
+    """The Husky: the windows of two in three commands for identification, those of the third for prediction."""
     runs = ji.read_log(data / "drive_husky" / "husky.csv.gz").runs()
-    known = join([run for k, run in enumerate(runs) if k % 3])
-    unseen = join([run for k, run in enumerate(runs) if not k % 3])
+    known = join([run for k, run in enumerate(runs) if k // WINDOWS % 3])
+    unseen = join([run for k, run in enumerate(runs) if k // WINDOWS % 3 == 0])
     return judge("husky", known, unseen, 20, 19, lambda u, p: commanded(u, p, HUSKY_TRACK, HUSKY_WHEEL), out, diagnosed)
 
 

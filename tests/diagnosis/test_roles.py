@@ -16,6 +16,7 @@ from jaxident.diagnosis.preparation.roles import (
     MOST_JUDGED,
     PARTS,
     SHORT,
+    judging,
     leverages,
     split,
 )
@@ -53,7 +54,22 @@ def test_every_row_has_one_role_and_a_third_judges(rows, runs):
     assert max(p.last - p.first for p in roles.fit) <= max(LONGEST, 2 * ROWS)
     assert len(roles.judge) <= max(PARTS, runs)
     if runs >= 3:
-        assert {p.run for p in roles.judge} == set(range(1, runs, 3))
+        assert {p.run for p in roles.judge} == {run for run in (1, 4, 6) if run < runs}
+
+
+@pytest.mark.parametrize("period", range(1, 13))
+def test_runs_of_every_phase_of_a_period_fit_and_judge_alike(period):
+    """Of 60 runs of each phase 16 to 24 judge; if every third run judged, all of a phase or none would, at period 3."""
+    judges = np.array(judging(60 * period))
+    for phase in range(period):
+        assert np.sum(judges[phase::period]) == pytest.approx(20, abs=4)
+
+
+def test_from_three_runs_on_each_purpose_has_some_and_judging_runs_lie_apart():
+    for count in range(3, 100):
+        judges = np.flatnonzero(judging(count))
+        assert 0.2 < len(judges) / count < 0.45
+        assert set(np.diff(judges)) <= {2, 3, 5}
 
 
 def driven(rows, runs, share, seed=0):

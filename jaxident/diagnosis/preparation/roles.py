@@ -9,8 +9,10 @@ from jaxident.diagnosis.motion.windows import Piece
 from jaxident.effects.fast_input import RUN_UP
 from jaxident.log import Log, run_begins
 
-SHARED_BY = 3
-"""Every third run judges, the second first, so that both purposes see early and late."""
+FEWEST_RUNS = 3
+"""Runs from which on whole runs have a role; fewer are cut into parts."""
+GOLDEN, FIRST, SHARE = (5.0**0.5 - 1.0) / 2.0, 0.45, 1.0 / 3.0
+"""The step from run to run, the first place and the width of those that judge (`judging`)."""
 LONGEST = 1000
 """Rows of a piece that is fitted: a scan over the commands of one longer run takes as long as that over many."""
 PARTS = 36
@@ -30,22 +32,33 @@ class Roles(NamedTuple):
 
 
 def split(log: Log, rows: int) -> Roles:
-    """Every third run judges; of one or two runs, every third part of them, of two windows (of `rows` rows) at
+    """A third of the runs judges; of one or two runs, a third of their parts, of two windows (of `rows` rows) at
     least. Of a log of many rows those pieces have a role whose commands tell most."""
     runs = log.runs()
     step = float(np.median(np.concatenate([np.diff(run.t) for run in runs])))
     lead = int(np.ceil(RUN_UP / step))
-    if len(runs) >= SHARED_BY:
+    if len(runs) >= FEWEST_RUNS:
         parts = [(k, 0, len(run.t)) for k, run in enumerate(runs)]
     else:
         size = max(2 * rows, -(-sum(len(run.t) for run in runs) // PARTS))
         parts = [part for k, run in enumerate(runs) for part in _parts(k, 0, len(run.t), size)]
-    judges = [number % SHARED_BY == 1 for number in range(len(parts))]
+    judges = judging(len(parts))
     fitted = [part for part, judging in zip(parts, judges, strict=True) if not judging]
     size = max(rows, LONGEST // rows * rows)
     fit = [_piece(*short, lead) for part in fitted for short in _parts(*part, size)]
     judge = [_piece(*part, lead) for part in itertools.compress(parts, judges)]
     return Roles(_most_telling(log, fit, MOST_FITTED, rows, lead), _most_telling(log, judge, MOST_JUDGED, rows, lead))
+
+
+def judging(count: int) -> list[bool]:
+    """Which of some runs judge: the second, the fifth and so on, two to five apart, a third of all.
+
+    Multiples of the golden ratio, less their whole parts, fill 0 to 1 evenly, and so do every second, every third or
+    every n-th of them. Those in a third of that judge. If every third run judged, logs with a period would be split by
+    it: a Husky's has three runs for each command, of which only the first shows how speeds settle.
+    """
+    places = GOLDEN * np.arange(count) % 1.0
+    return [bool(judges) for judges in (places >= FIRST) & (places < FIRST + SHARE)]
 
 
 def rows_served(roles: Roles) -> tuple[int, int]:
