@@ -17,11 +17,11 @@ import pathlib
 import numpy as np
 
 import jaxident as ji
-from jaxident.diagnosis.account.judging import judge_model
 from jaxident.diagnosis.account.shapley import shapley
 from jaxident.diagnosis.fit.refit import Data, refit
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.noise.law import Law, whitener_of
+from jaxident.diagnosis.preparation.judging import judge_model
 from jaxident.diagnosis.preparation.prepare import Prepared, prepare
 from jaxident.diagnosis.preparation.translate import to_model
 from jaxident.log import make_log

@@ -5,10 +5,10 @@ from importlib.metadata import version
 import numpy as np
 
 from jaxident import plot
-from jaxident.diagnosis.account.judging import CHANNELS
 from jaxident.diagnosis.account.shrink import interval
 from jaxident.diagnosis.decide import DIFFERENT
 from jaxident.diagnosis.diagnose import Diagnosis
+from jaxident.diagnosis.preparation.judging import CHANNELS
 from jaxident.origin import Origin
 from jaxident.report import causes, words
 from jaxident.report.account import account_section

@@ -5,13 +5,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from support.diagnoses import fit_of
-from support.small_robot import LAW, nominal_fit, robot_with, windows_of
+from support.small_robot import LAW, likeliest_end, nominal_fit, robot_with, windows_of
 
 from jaxident.diagnosis.causes.columns import tabulate
 from jaxident.diagnosis.causes.discrepancy import Rest
 from jaxident.diagnosis.causes.discrepancy_basis import Term
 from jaxident.diagnosis.causes.finding import CLAIMED, Finding, finding_of
-from jaxident.diagnosis.causes.search_rounds import TERMS, search
+from jaxident.diagnosis.causes.search_rounds import TERMS
 from jaxident.diagnosis.fit.refit import refit
 from jaxident.diagnosis.joint_comparison import (
     explain_together,
@@ -46,7 +46,7 @@ def found_of(sizes, seed=0) -> Finding:
     """The finding of a search on a small robot with some effects."""
     windows = windows_of(robot_with(sizes), seed)
     nominal = nominal_fit(windows)[1]
-    return finding_of(SimpleNamespace(nominal=nominal), search(windows, nominal))
+    return finding_of(SimpleNamespace(nominal=nominal), likeliest_end(windows, nominal))
 
 
 @pytest.fixture(scope="module")

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from jaxident.diagnosis.causes.search_rounds import Found, search
 from jaxident.diagnosis.fit.refit import Data, Solution, refit
 from jaxident.diagnosis.motion.linear import follow
 from jaxident.diagnosis.motion.windows import Windows, cut
@@ -40,6 +41,11 @@ def windows_of(vector, seed=0, late=0, law=LAW) -> Windows:
     path = path + rng.normal(size=path.shape) * [law.position, law.position, law.heading]
     poses = [log._replace(x=p[:, 0], y=p[:, 1], theta=p[:, 2]) for log, p in zip(runs, path, strict=True)]
     return cut(join(poses), 40)
+
+
+def likeliest_end(windows, nominal, without=()) -> Found:
+    """The end of a search that has the highest log evidence: without a log behind them windows cannot be foretold."""
+    return max(search(windows, nominal, without), key=lambda end: end.log_evidence)
 
 
 def nominal_fit(windows) -> tuple[Data, Solution]:

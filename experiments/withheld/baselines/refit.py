@@ -3,12 +3,12 @@ error wins."""
 
 import numpy as np
 
-from jaxident.diagnosis.account.judging import judge_model
 from jaxident.diagnosis.causes.columns import tabulate
 from jaxident.diagnosis.causes.evidence import log_evidence
 from jaxident.diagnosis.causes.moves import fit_options, stands
 from jaxident.diagnosis.fit.refit import Data, Solution, refit
 from jaxident.diagnosis.noise.law import deviations, first_law, white_whitener
+from jaxident.diagnosis.preparation.judging import judge_model
 from jaxident.diagnosis.preparation.prepare import prepare
 from jaxident.diagnosis.preparation.translate import to_model
 from jaxident.effects.coordinates import COORDINATES

@@ -13,9 +13,9 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.account.floor import Floor
-from jaxident.diagnosis.account.judging import CHANNELS
 from jaxident.diagnosis.account.shapley import shapley
 from jaxident.diagnosis.account.shrink import HIGH, LOW, blocks
+from jaxident.diagnosis.preparation.judging import CHANNELS
 from jaxident.effects.catalogue import CATALOGUE
 
 BEFORE, AFTER, UNNAMED = "before_wheel", "after_wheel", "unnamed"

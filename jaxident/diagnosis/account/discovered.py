@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.account.judging import Judged, judge_model
 from jaxident.diagnosis.account.models import Corrected, corrected_of
 from jaxident.diagnosis.account.shrink import LOW, taken
 from jaxident.diagnosis.account.sized import beside, sized_corrected
@@ -16,6 +15,7 @@ from jaxident.diagnosis.discovery.kinds import Kind
 from jaxident.diagnosis.discovery.search import discover
 from jaxident.diagnosis.noise.law import deviations
 from jaxident.diagnosis.noise.variance_uncertainty import Draws
+from jaxident.diagnosis.preparation.judging import Judged, judge_model
 from jaxident.diagnosis.preparation.prepare import Prepared
 from jaxident.robot.model import Discovered, Model
 

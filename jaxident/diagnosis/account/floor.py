@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxident.diagnosis.account.judging import CHANNELS, Judged, into_channels, judge_model
 from jaxident.diagnosis.account.luck import luck, luck_of_chance
 from jaxident.diagnosis.account.models import LOST, without
 from jaxident.diagnosis.noise.law import Law, deviations
 from jaxident.diagnosis.noise.variance_uncertainty import Draws
+from jaxident.diagnosis.preparation.judging import CHANNELS, Judged, into_channels, judge_model
 from jaxident.diagnosis.preparation.prepare import Prepared
 from jaxident.diagnosis.preparation.translate import noise_of
 from jaxident.effects.catalogue import BY_CHANCE, CATALOGUE

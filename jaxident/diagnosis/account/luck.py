@@ -3,7 +3,7 @@
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.account.judging import Judged
+from jaxident.diagnosis.preparation.judging import Judged
 from jaxident.diagnosis.preparation.prepare import Prepared
 from jaxident.effects.catalogue import BY_CHANCE
 from jaxident.log import run_begins

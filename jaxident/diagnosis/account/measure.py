@@ -10,7 +10,6 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.account.account import Account, account_of
 from jaxident.diagnosis.account.discovered import Shown, confirm, each_law
 from jaxident.diagnosis.account.floor import Floor, floor_of
-from jaxident.diagnosis.account.judging import Judged, judge_model
 from jaxident.diagnosis.account.models import placebo_of, players_of, with_players, without
 from jaxident.diagnosis.account.refused import refused
 from jaxident.diagnosis.account.shrink import HIGH, LOW, Shrink, interval, shrink_of
@@ -19,6 +18,7 @@ from jaxident.diagnosis.account.where import Place, increments, locate
 from jaxident.diagnosis.causes.discrepancy import UNEXPLAINED
 from jaxident.diagnosis.causes.finding import Finding
 from jaxident.diagnosis.noise.law import deviations
+from jaxident.diagnosis.preparation.judging import Judged, judge_model
 from jaxident.diagnosis.preparation.prepare import Prepared
 from jaxident.robot.model import Model
 

@@ -4,7 +4,6 @@ that no fit saw better without them: a corrected model that has them would be wo
 from collections.abc import Collection, Mapping
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.account.judging import Judged
 from jaxident.diagnosis.account.models import LOST
 from jaxident.diagnosis.account.shrink import LOW, taken
 from jaxident.diagnosis.causes.columns import tabulate
@@ -12,6 +11,7 @@ from jaxident.diagnosis.causes.finding import Finding
 from jaxident.diagnosis.causes.moves import stands
 from jaxident.diagnosis.causes.settled import noise_beside, whiten
 from jaxident.diagnosis.fit.refit import refit
+from jaxident.diagnosis.preparation.judging import Judged
 from jaxident.effects.coordinates import NOMINAL, PLACES, neutral_vector
 
 TURNS = 2

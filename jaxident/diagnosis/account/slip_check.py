@@ -9,20 +9,18 @@ import dataclasses
 
 import numpy as np
 
-from jaxident.diagnosis.account.judging import judge_model
 from jaxident.diagnosis.account.shrink import RESAMPLES, blocks
 from jaxident.diagnosis.noise.law import Law, deviations
+from jaxident.diagnosis.preparation.judging import judge_model, on_fitted, some_of
 from jaxident.diagnosis.preparation.prepare import Prepared
-from jaxident.estimation.ahead.stretches import Starts
 from jaxident.robot.model import Model
 from jaxident.robot.noise import Noise
 
 SURE = 1.5
 """Standard errors of the mean square by which the law must foretell too much; chance alone does in one case of 15. At
 1.5 as at 3, the floor's interval lies above the error on 1 of 38 simulated robots."""
-MOST_STARTS, FOR_PARAMETERS = 200, 50
-"""Starts that are looked at, spread evenly: six runs of 1000 rows have fewer, a whole log of a Create three times as
-many. And starts that are predicted once for every parameter besides."""
+FOR_PARAMETERS = 50
+"""Starts that are predicted once for every parameter besides. No other number was tried."""
 ROUNDS, NEAR = 6, 0.02
 """Steps in which slip is taken back, and the part of the error to which they go."""
 
@@ -33,7 +31,7 @@ def slip_seen(model: Model, prepared: Prepared, law: Law) -> float:
     if law.slip is None or not len(prepared.naming.row):
         return 1.0
     bare, unit = dataclasses.replace(model, covariance=None, parameter_order=()), deviations(law) ** 2
-    fitted = prepared._replace(log=prepared.fitted, judging=_some(prepared.naming, MOST_STARTS))
+    fitted = on_fitted(prepared)
     judged = judge_model(bare, fitted)
     kept = np.isfinite(judged.error).all(axis=1)
     if not kept.any():
@@ -55,16 +53,10 @@ def slip_seen(model: Model, prepared: Prepared, law: Law) -> float:
     return min(factor, 1.0)
 
 
-def _some(starts: Starts, most: int) -> Starts:
-    """So many of some starts, spread evenly."""
-    chosen = np.unique(np.linspace(0, len(starts.row) - 1, most).round().astype(int))
-    return Starts(starts.run[chosen], starts.row[chosen])
-
-
 def _taken_by_fit(model: Model, fitted: Prepared, unit) -> float:
     """What a fit to the same rows takes from their mean error over the camera's variances: as much as its parameters
     could move it by."""
-    slopes = judge_model(model, fitted._replace(judging=_some(fitted.judging, FOR_PARAMETERS))).slopes
+    slopes = judge_model(model, fitted._replace(judging=some_of(fitted.judging, FOR_PARAMETERS))).slopes
     found = np.sum(slopes**2, axis=0) / unit
     return float(np.mean(found[np.isfinite(found).all(axis=1)])) if np.isfinite(found).all(axis=1).any() else 0.0
 

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.account.judging import CHANNELS
+from jaxident.diagnosis.preparation.judging import CHANNELS
 from jaxident.diagnosis.preparation.prepare import Prepared
 from jaxident.log import run_begins
 

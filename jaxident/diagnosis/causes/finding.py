@@ -7,6 +7,7 @@ import numpy as np
 
 from jaxident.diagnosis.causes.columns import Table
 from jaxident.diagnosis.causes.discrepancy import Rest
+from jaxident.diagnosis.causes.ends import best_end
 from jaxident.diagnosis.causes.evidence import WRONG, Worth, evidence_of, worth
 from jaxident.diagnosis.causes.search import joining
 from jaxident.diagnosis.causes.search_rounds import TERMS, Found, search
@@ -92,11 +93,11 @@ def find_effects(prepared: Prepared, without: Collection[str] = (), law: Law | N
     """The search on prepared windows, and these with the commands that arrived where some were lost. `without`: effects
     that the catalogue is to lack. A noise law that is given, that of a simulator, stays as it is. Where a robot without
     effects coasts, its rates are held, and the search is made again."""
-    found = search(prepared.windows, prepared.nominal, without, law)
+    found = best_end(prepared, search(prepared.windows, prepared.nominal, without, law))
     while law is None and np.any(found.coasting):
         windows, nominal = hold_rates(prepared.windows, found.coasting, prepared.told)
         prepared = prepared._replace(windows=windows, nominal=nominal)
-        found = search(windows, nominal, without, law)
+        found = best_end(prepared, search(windows, nominal, without, law))
     if found.lost is not None:
         prepared = repaired(prepared, found.lost)
     return prepared, finding_of(prepared, found, without)

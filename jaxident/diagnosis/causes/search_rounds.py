@@ -15,7 +15,6 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.causes.columns import Table, answers_of, tabulate
 from jaxident.diagnosis.causes.discrepancy import UNEXPLAINED, Rest
 from jaxident.diagnosis.causes.discrepancy_basis import WORTH
-from jaxident.diagnosis.causes.ends import misses, preferred
 from jaxident.diagnosis.causes.evidence import worth
 from jaxident.diagnosis.causes.moves import Move, better, fit_options, ranked, stands
 from jaxident.diagnosis.causes.search import MOST_EFFECTS, best_set
@@ -68,36 +67,28 @@ class Found(NamedTuple):
         return coasts(self.nominal, self.settled.data.windows, bool(self.rest.terms))
 
     @property
-    def misses(self) -> np.ndarray:
-        """By how much its effects and its likeliest law, all that the corrected model has, miss what each window
-        (windows,) shows later."""
-        now, data = self.settled.now, self.settled.data
-        return misses(whiten(now.fit, data.windows, self.likely)[0], now.fit)
-
-    @property
     def log_evidence(self) -> float:
         """Of effects, terms and noise law together."""
         now = self.settled.now
         return self.rest.log_likelihood + (now.evidence + now.fit.cost) - WORTH * len(self.rest.terms)
 
 
-def search(windows: Windows, nominal: Solution, without: Collection[str] = (), law: Law | None = None) -> Found:
-    """The effects of some windows, from a nominal fit. `without`: effects that the catalogue is to lack. A law that is
-    given stays as it is.
+def search(windows: Windows, nominal: Solution, without: Collection[str] = (), law: Law | None = None) -> list[Found]:
+    """The ends of a search for the effects of some windows, from a nominal fit. `without`: effects that the catalogue
+    is to lack. A law that is given stays as it is.
 
     The search begins at white noise. Where its end leaves something, a second search begins at noise as the nominal
-    fit leaves it. The end with the higher log evidence is taken, unless the other surely foretells the poses better
-    (`ends.preferred`). A nominal model misses a real robot by twenty times the camera's error, and a search that
-    takes all of that for effects may lose its way. Where both ends are worse than no effect at all, no effect is
-    named. Where the robot without effects coasts the first end is given back: its rates are to be held, and the
-    search made again (`finding.find_effects`).
+    fit leaves it (`ends.best_end` chooses). A nominal model misses a real robot by twenty times the camera's error, and
+    a search that takes all of that for effects may lose its way. Where both ends are worse than no effect at all, the
+    only end has no effect. Where the robot without effects coasts, the first end is the only one: its rates are to be
+    held, and the search made again (`finding.find_effects`).
     """
     begin, sized, without = Move(nominal, (), -nominal.cost), law is None, {*without, *untold(windows)}
     wheel = first_noise(nominal.linear.rims, np.exp(nominal.vector[:2]), windows)
     law = first_law(windows)._replace(wheel=wheel) if law is None else law
     ends = [climb(windows, nominal, begin, law, without, sized)]
     if sized and np.any(ends[0].coasting):
-        return ends[0]
+        return ends
     if sized and (ends[0].rest.terms or ends[0].worse_than_none):
         responses = respond(np.exp(nominal.vector[:2]), nominal.linear.residual, windows)
         law = size_noise(nominal.linear.residual, nominal.linear.starts, windows, responses)._replace(wheel=wheel)
@@ -106,7 +97,7 @@ def search(windows: Windows, nominal: Solution, without: Collection[str] = (), l
     ends = [each for each in ends if not each.worse_than_none]
     if not ends:
         ends = [climb(windows, nominal, begin, law, COORDINATES, sized, memory_last=False)]
-    return ends[preferred([each.log_evidence for each in ends], [each.misses for each in ends])]
+    return ends
 
 
 def climb(

@@ -11,13 +11,13 @@ import pytest
 
 from jaxident.diagnosis.account.account import PLACES, account_of
 from jaxident.diagnosis.account.floor import Floor, floor_of
-from jaxident.diagnosis.account.judging import judge_model
 from jaxident.diagnosis.account.luck import luck, luck_of_chance
 from jaxident.diagnosis.account.shapley import shapley
 from jaxident.diagnosis.account.slip_check import slip_seen
 from jaxident.diagnosis.motion.windows import whole_runs
 from jaxident.diagnosis.noise.law import Law, deviations, less_slip, variances_of
 from jaxident.diagnosis.noise.variance_uncertainty import Draws
+from jaxident.diagnosis.preparation.judging import judge_model
 from jaxident.diagnosis.preparation.prepare import judging_starts
 from jaxident.diagnosis.preparation.translate import noise_of
 from jaxident.effects.catalogue import CATALOGUE

@@ -1,86 +1,97 @@
-"""Which end of a search is taken: the one with more log evidence, unless another surely foretells the poses better."""
+"""Which end of a search is taken: the one with more log evidence, unless another foretells the poses better."""
 
+from types import SimpleNamespace
+
+import jax
 import numpy as np
 import pytest
-from support.small_robot import LAW, nominal_fit, robot_with, windows_of
 
-from jaxident.diagnosis.causes.ends import misses, preferred
-from jaxident.diagnosis.causes.settled import whiten
-from jaxident.diagnosis.fit.refit import refit
-from jaxident.diagnosis.motion.responses import respond
-from jaxident.diagnosis.noise.law import Law, covariance, first_law
-from jaxident.diagnosis.preparation.prepare import BURN
-from jaxident.effects.coordinates import PLACES
+from jaxident.diagnosis.causes.ends import SURELY, best_end, foretells_better, misses
+from jaxident.diagnosis.noise.law import Law, first_law
+from jaxident.diagnosis.preparation.judging import on_fitted
+from jaxident.diagnosis.preparation.prepare import prepare
+from jaxident.effects.coordinates import PLACES, neutral_vector, nominal_vector
+from jaxident.effects.simulate import simulate
+from jaxident.estimation.predict import predict
+from jaxident.log import Log
+from jaxident.robot.drive import Physical
+from jaxident.robot.model import Effect, Model
+from jaxident.robot.noise import Noise
+from jaxident.study.synthetic import excite
 
-LAG = "motor_lag", "time_constant"
+LAW = Law(4e-4, 3e-3)
+DELAY = ("transport_delay", "delay")
+ROBOT = Model(
+    1.0 / 30.0, Physical(np.array([4.0, 5.0]), np.array([[0.5, 0.45], [9.0, -8.5]])), np.array([0.1, 0.12]),
+    Noise(LAW.position, LAW.heading), (Effect("transport_delay", {"delay": 0.1}),),
+)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
-def lagging():
-    """Data of a robot with a lag, and its fits without and with it."""
-    data, nominal = nominal_fit(windows_of(robot_with({LAG: 0.1})))
-    vector = nominal.vector.copy()
-    vector[PLACES[LAG]] = 0.1
-    return data, nominal, refit(data, vector, nominal.starts, ("motor_lag",))
+def prepared():
+    """Three runs of a robot with a delay of 0.1 s."""
+    plain = [excite(jax.random.key(k), "multilevel", 400, ROBOT.sample_period, hold=10) for k in range(3)]
+    runs = [simulate(ROBOT, log, key=jax.random.key(10 + k)) for k, log in enumerate(plain)]
+    return prepare([Log(*map(np.asarray, run)) for run in runs], None)
 
 
-def slow_misses(fit, windows, law):
-    """The same window by window: generalised least squares for the start state, the mean of what is random later given
-    what was random before, the mean of squares."""
-    unit = np.array([first_law(windows).position] * 2 + [first_law(windows).heading])
-    every = covariance(law, windows, respond(np.exp(fit.vector[:2]), fit.linear.residual, windows))
-    found = []
-    for k, (own, residual, slopes) in enumerate(zip(every, fit.linear.residual, fit.linear.starts, strict=True)):
-        seen, row = np.repeat(np.asarray(windows.seen)[:, k], 3), np.repeat(np.arange(len(windows.seen)), 3)
-        early, late = np.flatnonzero(seen & (row < BURN)), np.flatnonzero(seen & (row >= BURN))
-        inverse = np.linalg.inv(own[np.ix_(early, early)])
-        start = np.linalg.solve(slopes[early].T @ inverse @ slopes[early], slopes[early].T @ inverse @ residual[early])
-        random = own[np.ix_(late, early)] @ inverse @ (residual[early] - slopes[early] @ start)
-        missed = (residual[late] - slopes[late] @ start - random) / unit[late % 3]
-        found.append(np.mean(missed**2) if len(late) else np.nan)
-    return np.array(found)
+def end(prepared, log_evidence, vector=None, effects=()):
+    """An end at some coordinates, those of the nominal fit by default."""
+    fit = SimpleNamespace(vector=np.array(prepared.nominal.vector if vector is None else vector))
+    settled = SimpleNamespace(now=SimpleNamespace(fit=fit, effects=effects))
+    return SimpleNamespace(settled=settled, likely=LAW, log_evidence=log_evidence)
 
 
-@pytest.mark.parametrize("law", [LAW, Law(2e-4, 2e-3, (0.1, 0.5), 0.1)], ids=["white", "slip"])
-def test_what_a_fit_misses_is_what_a_filter_cannot_foretell_window_by_window(lagging, law):
-    data, *fits = lagging
-    seen = np.array(data.windows.seen)
-    seen[BURN + 3 :, 0] = seen[BURN:, 1] = False  # one window ends early, one shows nothing to foretell
-    windows = data.windows._replace(seen=seen)
-    for fit in fits:
-        found = misses(whiten(fit, windows, law)[0], fit)
-        assert np.isnan(found[1])
-        np.testing.assert_allclose(found, slow_misses(fit, windows, law), rtol=1e-4)
+def true_coordinates(prepared):
+    """Those of the robot, for commands over the largest."""
+    physical, largest = ROBOT.dynamics, prepared.largest
+    scaled = Physical(physical.rate, physical.gain * largest)
+    vector = neutral_vector(nominal_vector(scaled, ROBOT.dead_zone / largest))
+    vector[PLACES[DELAY]] = 0.1
+    return vector
 
 
-def test_the_true_model_misses_what_camera_and_start_state_make(lagging):
-    data, nominal, fit = lagging
-    assert 1.0 < np.mean(misses(data, fit)) < 2.0 < np.mean(misses(data, nominal))
+def test_an_end_misses_the_rows_that_fit_by_what_predict_misses_them_by(prepared):
+    fitted, camera = on_fitted(prepared), first_law(prepared.windows)
+    found = misses(fitted, end(prepared, 0.0, true_coordinates(prepared), DELAY[:1]))
+    ahead = predict(ROBOT, fitted.log, prepared.rows, stride=1)
+    runs, seen = fitted.log.runs(), []
+    for run, row in zip(fitted.judging.run, fitted.judging.row, strict=True):
+        here = (ahead.run == runs[run].run[0]) & (ahead.start == row) & (ahead.step == prepared.rows)
+        missed = [
+            float(getattr(ahead, k)[here][0] - getattr(runs[run], k)[row + prepared.rows]) for k in ("x", "y", "theta")
+        ]
+        missed[2] = (missed[2] + np.pi) % (2.0 * np.pi) - np.pi
+        seen.append(np.mean(np.square(missed) / np.square([camera.position, camera.position, camera.heading])))
+    np.testing.assert_allclose(found, seen, rtol=1e-6)
 
 
-def test_an_end_that_foretells_better_is_taken_in_spite_of_its_evidence(lagging):
-    data, nominal, fit = lagging
-    missed = [misses(data, nominal), misses(data, fit)]
-    assert preferred([100.0, 0.0], missed) == 1
-    assert preferred([0.0, 100.0], missed) == 1
+def test_the_end_that_foretells_better_is_taken_in_spite_of_its_evidence(prepared):
+    plain, delayed = end(prepared, 100.0), end(prepared, 0.0, true_coordinates(prepared), DELAY[:1])
+    assert np.mean(misses(on_fitted(prepared), delayed)) < 0.5 * np.mean(misses(on_fitted(prepared), plain))
+    assert best_end(prepared, [plain, delayed]) is delayed
+    assert best_end(prepared, [delayed, plain]) is delayed
 
 
-def test_evidence_decides_between_ends_that_foretell_about_equally():
-    """In at most one of ten pairs by chance: 400 pairs, five standard errors."""
-    rng, wrong = np.random.default_rng(0), 0
-    for _ in range(400):
-        missed = rng.chisquare(3, (2, 60))
-        wrong += preferred([1.0, 0.0], list(missed))
-    assert 0 < wrong < 400 * 0.05 + 5.0 * np.sqrt(400 * 0.05 * 0.95)
+def test_evidence_decides_between_ends_that_foretell_alike(prepared):
+    ends = [end(prepared, evidence) for evidence in (1.0, 3.0, 2.0)]
+    assert best_end(prepared, ends) is ends[1]
+    assert best_end(prepared, ends[:1]) is ends[0]
 
 
-def test_an_end_that_runs_away_is_not_taken(lagging):
-    data, nominal, fit = lagging
-    residual = np.array(nominal.linear.residual)
-    residual[3] = np.nan
-    wild = misses(data, nominal._replace(linear=nominal.linear._replace(residual=residual)))
-    assert np.isposinf(wild[3])
-    fine = misses(data, fit)
-    assert preferred([9.0, 0.0], [wild, fine]) == 1
-    assert preferred([0.0, 9.0], [wild, 10.0 * fine]) == 1
-    assert preferred([9.0], [wild]) == 0
+def test_chance_alone_foretells_better_in_one_case_of_six():
+    """400 pairs, four standard errors."""
+    rng = np.random.default_rng(0)
+    wrong = sum(foretells_better(*rng.chisquare(3, (2, 60))) for _ in range(400))
+    assert SURELY == 1.0
+    assert wrong / 400 == pytest.approx(0.159, abs=4.0 * np.sqrt(0.159 * 0.841 / 400))
+
+
+def test_an_end_that_runs_away_is_not_taken(prepared):
+    fine = np.linspace(1.0, 2.0, 9)
+    wild = np.where(np.arange(9) == 3, np.inf, 0.1 * fine)
+    assert foretells_better(fine, wild)
+    assert not foretells_better(wild, fine)
+    away = end(prepared, 0.0)
+    away.settled.now.fit.vector[8:10] = 2000.0  # couplings that make speeds grow by e every half a millisecond
+    assert np.isinf(misses(on_fitted(prepared), away)).all()

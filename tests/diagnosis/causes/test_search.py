@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support.small_robot import LAW, VECTOR, nominal_fit, robot_with, windows_of
+from support.small_robot import LAW, VECTOR, likeliest_end, nominal_fit, robot_with, windows_of
 
 from jaxident.diagnosis.causes.columns import tabulate
 from jaxident.diagnosis.causes.discrepancy import Rest
@@ -12,7 +12,7 @@ from jaxident.diagnosis.causes.discrepancy_basis import Term
 from jaxident.diagnosis.causes.evidence import evidence_of, log_evidence
 from jaxident.diagnosis.causes.finding import finding_of
 from jaxident.diagnosis.causes.moves import ARRIVED, better, fit_options, look_alikes, stands
-from jaxident.diagnosis.causes.search_rounds import Found, defended, search, settle
+from jaxident.diagnosis.causes.search_rounds import Found, defended, settle
 from jaxident.diagnosis.causes.settled import Settled
 from jaxident.diagnosis.fit.refit import refit
 from jaxident.diagnosis.motion.linear import linearise
@@ -26,7 +26,7 @@ SLOPE = {("slope", "x"): 0.2, ("slope", "y"): -0.1}
 
 def found_on(windows, nominal, without=()):
     """The finding of a search on windows that need no log behind them."""
-    return finding_of(SimpleNamespace(nominal=nominal), search(windows, nominal, without), without)
+    return finding_of(SimpleNamespace(nominal=nominal), likeliest_end(windows, nominal, without), without)
 
 
 def found_of(sizes, without=(), seed=0):

@@ -7,9 +7,13 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.diagnosis.preparation.prepare import BURN, Prepared
 from jaxident.estimation.ahead.run_ahead import run_ahead
+from jaxident.estimation.ahead.stretches import Starts
 from jaxident.log import run_begins
 from jaxident.robot.model import Model
 
+MOST_STARTS = 200
+"""Starts among the rows that fit from which models are looked at: six runs of 1000 rows have fewer, a whole log of a
+Create three times as many."""
 CHANNELS = ("along", "lateral", "heading")
 
 
@@ -34,6 +38,17 @@ class Judged(NamedTuple):
     def squares(self) -> tuple[np.ndarray, np.ndarray]:
         """Expected squares (starts, 3) by the start state, and by slip."""
         return np.diagonal(self.start, axis1=1, axis2=2), np.diagonal(self.slip, axis1=1, axis2=2)
+
+
+def on_fitted(prepared: Prepared) -> Prepared:
+    """The logs with the rows that fit in place of those that judge, and at most MOST_STARTS of the starts there."""
+    return prepared._replace(log=prepared.fitted, judging=some_of(prepared.naming, MOST_STARTS))
+
+
+def some_of(starts: Starts, most: int) -> Starts:
+    """At most so many of some starts, spread evenly."""
+    chosen = np.unique(np.linspace(0, len(starts.row) - 1, most).round().astype(int))
+    return Starts(starts.run[chosen], starts.row[chosen])
 
 
 def judge_model(model: Model, prepared: Prepared) -> Judged:
