@@ -105,10 +105,10 @@ def diagnose(
     """Diagnose the gap between a robot's logs and a nominal model: where it lies, which effect causes it, how far it
     shrinks.
 
-    Every third run, from the second on, is kept for judging; of one or two runs, every third part. Of a long log at
-    most 16,000 rows fit and 8,000 judge, those whose commands tell most. The gap, its account and how far it shrinks
-    come from the rows that judge alone. Effects that the nominal model has are no gap. Needs double precision and about
-    a minute.
+    A third of the runs is kept for judging, the second and others two to five apart; of one or two runs, a third of
+    their parts. Of a long log at most 16,000 rows fit and 8,000 judge, those whose commands tell most. The gap, its
+    account and how far it shrinks come from the rows that judge alone. Effects that the nominal model has are no gap.
+    Needs double precision and about a minute.
 
     Args:
         logs: the robot's logs, several runs if possible.
