@@ -9,6 +9,8 @@ from typing import Any
 
 import jax
 
+from jaxident.numerics import float64_switch
+
 SMALLEST_CARD = 2 << 30
 """Bytes of a card that does not tell its memory: no card that is sold for such work has less."""
 _most_cores: contextvars.ContextVar[int | None] = contextvars.ContextVar("most_cores", default=None)
@@ -39,8 +41,10 @@ def in_parallel(
     if cores is None:
         cores = _most_cores.get() or (os.cpu_count() if card_memory() is None else 1)
 
+    same = as_precise(function)
+
     def run(block: tuple[Any, ...]) -> Any:
-        return jax.block_until_ready(function(*block))
+        return jax.block_until_ready(same(*block))
 
     alone = 0 if ahead else 1
     first, others = [run(block) for block in blocks[:alone]], blocks[alone:]
@@ -48,6 +52,17 @@ def in_parallel(
         return first + [run(block) for block in others]
     with ThreadPoolExecutor(cores) as threads:
         return first + list(threads.map(run, others))
+
+
+def as_precise(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The function for other threads, in the precision that this one has: JAX switches each thread by itself."""
+    double = bool(jax.config.jax_enable_x64)  # type: ignore[attr-defined]
+
+    def call(*args: Any) -> Any:
+        with float64_switch(double):
+            return function(*args)
+
+    return call
 
 
 def card_memory() -> int | None:

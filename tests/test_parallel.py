@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from jaxident.numerics import float64_switch
 from jaxident.parallel import at_most, in_parallel
 
 
@@ -36,3 +37,12 @@ def test_beside_other_processes_no_more_threads_are_started():
         assert threads() == {threading.get_ident()}
     with at_most(None):
         assert threads()
+
+
+def test_threads_compute_in_the_precision_of_their_caller():
+    """A switch for a block of code holds for one thread only; without it threads would have that of the program."""
+    blocks = [(np.full(3, 1.0 / 3.0 + k),) for k in range(4)]
+    for double in (False, True):
+        with float64_switch(double):
+            found = in_parallel(jax.jit(lambda a: a * 2.0), blocks, 2)
+        assert {str(each.dtype) for each in found} == {"float64" if double else "float32"}

@@ -16,6 +16,7 @@ from jaxident.estimation.increments.initialise import initialise
 from jaxident.estimation.increments.observations import observe_log, tail
 from jaxident.estimation.predict import Prediction, predict
 from jaxident.log import Log
+from jaxident.parallel import as_precise
 from jaxident.robot.dead_zone import effective_command
 from jaxident.robot.difference import to_difference
 from jaxident.robot.drive import force, hold
@@ -204,9 +205,11 @@ def reproduce(robot: Model, reference: Model, *, seed: int = 0, seeds: int = 200
     Needs double precision.
     """
     key_input, key_noise = jax.random.split(jax.random.key(seed))
-    log = paper_log(robot, key_input)
+    log, levels = paper_log(robot, key_input), jnp.array(NOISE_LEVELS)
     with ThreadPoolExecutor() as both:  # most of the time is compilation, which runs side by side
-        noise = both.submit(noise_study, jax.tree.map(jnp.asarray, log), key_noise, jnp.array(NOISE_LEVELS), seeds)
+        noise = both.submit(
+            as_precise(noise_study), jax.tree.map(jnp.asarray, log), key_noise, jnp.array(NOISE_LEVELS), seeds
+        )
         found = identify(log, "paper", reading="one_step")
         drifts = drift_study(robot, log)
         modelled = Log(*(np.asarray(column) for column in simulate(found.model, log)))
