@@ -207,9 +207,7 @@ def reproduce(robot: Model, reference: Model, *, seed: int = 0, seeds: int = 200
     key_input, key_noise = jax.random.split(jax.random.key(seed))
     log, levels = paper_log(robot, key_input), jnp.array(NOISE_LEVELS)
     with ThreadPoolExecutor() as both:  # most of the time is compilation, which runs side by side
-        noise = both.submit(
-            as_precise(noise_study), jax.tree.map(jnp.asarray, log), key_noise, jnp.array(NOISE_LEVELS), seeds
-        )
+        noise = both.submit(as_precise(noise_study), jax.tree.map(jnp.asarray, log), key_noise, levels, seeds)
         found = identify(log, "paper", reading="one_step")
         drifts = drift_study(robot, log)
         modelled = Log(*(np.asarray(column) for column in simulate(found.model, log)))
