@@ -63,8 +63,10 @@ class Found(NamedTuple):
 
     @property
     def coasting(self) -> np.ndarray:
-        """Which speeds (2,) of the robot without effects coast."""
-        return coasts(self.nominal, self.settled.data.windows, bool(self.rest.terms))
+        """Which speeds (2,) coast of the robot without effects and of that with them: a robot without its effects may
+        seem to for want of these. A speed that settles at 0.54 1/s did, seen by a marker 3 cm off the axle."""
+        windows, doubted = self.settled.data.windows, bool(self.rest.terms)
+        return coasts(self.nominal, windows, doubted) & coasts(self.settled.now.fit, windows, doubted)
 
     @property
     def log_evidence(self) -> float:

@@ -212,6 +212,16 @@ def test_a_search_is_held_against_no_effect_at_all(lagging, evidence, worse):
     assert Found(settled, LAW, LAW, Rest([], np.zeros(0), LAW, 0.0), None, nominal).worse_than_none == worse
 
 
+def test_a_robot_coasts_only_if_it_does_so_with_its_effects_too(lagging):
+    """Slow fits whose gains have no clear sign, in place of that without effects and of that with them."""
+    data, fit = nominal_fit(lagging)
+    slow = fit._replace(vector=np.concatenate([np.log([0.2, 0.2]), fit.vector[2:]]), covariance=1e6 * fit.covariance)
+    for nominal, now, coasting in ((slow, slow, True), (slow, fit, False), (fit, slow, False)):
+        settled = Settled(stands(now, ()), data, tabulate(data, fit, ()), {})
+        found = Found(settled, LAW, LAW, Rest([], np.zeros(0), LAW, 0.0), None, nominal)
+        assert found.coasting.tolist() == [coasting, coasting]
+
+
 def test_a_refit_that_begins_at_a_robot_that_runs_away_begins_without_coupling():
     """Couplings of 2,000 make speeds grow by e every half a millisecond: within a window they leave every number."""
     data, nominal = nominal_fit(windows_of(VECTOR))
