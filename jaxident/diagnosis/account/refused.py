@@ -10,6 +10,7 @@ from jaxident.diagnosis.causes.columns import tabulate
 from jaxident.diagnosis.causes.finding import Finding
 from jaxident.diagnosis.causes.moves import stands
 from jaxident.diagnosis.causes.settled import noise_beside, whiten
+from jaxident.diagnosis.fit.nominal import fit_without_effects
 from jaxident.diagnosis.fit.refit import refit
 from jaxident.diagnosis.preparation.judging import Judged
 from jaxident.effects.coordinates import NOMINAL, PLACES, neutral_vector
@@ -55,7 +56,7 @@ def finding_without(finding: Finding, refused: Collection[str]) -> Finding:
         now = stands(refit(data, vector, finding.nominal.starts, names), names)
         likely, rest = noise_beside(data, now.fit, law)
         law, vector = rest.law, now.fit.vector
-    nominal = refit(data, finding.nominal.vector, finding.nominal.starts, ())
+    nominal = fit_without_effects(data, finding.nominal, now.fit, bool(rest.terms))
     values = {frozenset(): stands(nominal, ()).evidence - now.evidence, frozenset(names): 0.0}
     table = tabulate(data, now.fit, names, rest.answers)
     return Finding(data, law, likely, nominal, now.fit, names, values, rest, table)

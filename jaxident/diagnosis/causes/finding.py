@@ -9,11 +9,12 @@ from jaxident.diagnosis.causes.columns import Table
 from jaxident.diagnosis.causes.discrepancy import Rest
 from jaxident.diagnosis.causes.ends import best_end
 from jaxident.diagnosis.causes.evidence import WRONG, Worth, evidence_of, worth
+from jaxident.diagnosis.causes.moves import stands
 from jaxident.diagnosis.causes.search import joining
-from jaxident.diagnosis.causes.search_rounds import TERMS, Found, search
+from jaxident.diagnosis.causes.search_rounds import TERMS, Found, climb, search
 from jaxident.diagnosis.causes.settled import Settled
-from jaxident.diagnosis.fit.nominal import hold_rates
-from jaxident.diagnosis.fit.refit import Data, Solution
+from jaxident.diagnosis.fit.nominal import coasts, hold_rates
+from jaxident.diagnosis.fit.refit import Data, Solution, refit
 from jaxident.diagnosis.motion.rims import untold
 from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.preparation.prepare import Prepared, repaired
@@ -91,16 +92,29 @@ class Finding(NamedTuple):
 
 def find_effects(prepared: Prepared, without: Collection[str] = (), law: Law | None = None) -> tuple[Prepared, Finding]:
     """The search on prepared windows, and these with the commands that arrived where some were lost. `without`: effects
-    that the catalogue is to lack. A noise law that is given, that of a simulator, stays as it is. Where a robot without
-    effects coasts, its rates are held, and the search is made again."""
-    found = best_end(prepared, search(prepared.windows, prepared.nominal, without, law))
+    that the catalogue is to lack. A noise law that is given, that of a simulator, stays as it is. Where a robot coasts,
+    its rates are held, and the search is made again; then they are let go, if it does not coast with what was found."""
+    found, free = best_end(prepared, search(prepared.windows, prepared.nominal, without, law)), prepared
     while law is None and np.any(found.coasting):
         windows, nominal = hold_rates(prepared.windows, found.coasting, prepared.told)
         prepared = prepared._replace(windows=windows, nominal=nominal)
         found = best_end(prepared, search(windows, nominal, without, law))
+    if prepared is not free and (other := let_go(free, found, without)) is not None:
+        prepared, found = free, other
     if found.lost is not None:
         prepared = repaired(prepared, found.lost)
     return prepared, finding_of(prepared, found, without)
+
+
+def let_go(prepared: Prepared, held: Found, without: Collection[str] = ()) -> Found | None:
+    """The search from where one with held rates ended, on windows that hold none; None where the robot coasts all the
+    same. A large effect may hide how a robot settles, and be found only while its rates are held."""
+    windows, now = prepared.windows, held.settled.now
+    fit = refit(held.settled.data._replace(windows=windows), now.fit.vector, now.fit.starts, now.effects)
+    if not now.effects or np.any(coasts(fit, windows, bool(held.rest.terms))):
+        return None
+    found = climb(windows, prepared.nominal, stands(fit, now.effects), held.law, without, memory_last=False)
+    return None if np.any(found.coasting) or found.worse_than_none else found
 
 
 def finding_of(prepared: Prepared, found: Found, without: Collection[str] = ()) -> Finding:

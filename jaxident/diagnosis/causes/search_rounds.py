@@ -19,7 +19,7 @@ from jaxident.diagnosis.causes.evidence import worth
 from jaxident.diagnosis.causes.moves import Move, better, fit_options, ranked, stands
 from jaxident.diagnosis.causes.search import MOST_EFFECTS, best_set
 from jaxident.diagnosis.causes.settled import Settled, noise_beside, same_law, whiten
-from jaxident.diagnosis.fit.nominal import coasts
+from jaxident.diagnosis.fit.nominal import coasts, fit_without_effects
 from jaxident.diagnosis.fit.refit import Data, Solution, refit
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.motion.rims import first_noise, untold
@@ -131,7 +131,7 @@ def climb(
                 continue
         more = find_lost(state.data, now.fit) if repairs < MOST_REPAIRS else None
         if more is None or more.gain < max(SENT, TERMS * rest.largest):
-            bare = refit(state.data, nominal.vector, nominal.starts, ())
+            bare = fit_without_effects(state.data, nominal, now.fit, bool(rest.terms))
             return defended(Found(state, law, likely, rest, lost, bare))
         share, gain = (0.0, 0.0) if lost is None else (lost.share, lost.gain)
         lost = more._replace(share=share + more.share, gain=gain + more.gain)

@@ -20,7 +20,7 @@ from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.motion.windows import Piece, Windows
 from jaxident.diagnosis.noise.law import Law, first_law, white_whitener, whitener_of
 from jaxident.diagnosis.noise.sizing import size_noise
-from jaxident.effects.coordinates import neutral_vector, nominal_vector
+from jaxident.effects.coordinates import NOMINAL, neutral_vector, nominal_vector
 from jaxident.errors import InputError
 from jaxident.estimation.poses.maximum_likelihood import begin
 from jaxident.estimation.poses.noise_law import CLEAR
@@ -88,6 +88,19 @@ def coasts(fit: Solution, windows: Windows, unexplained: bool) -> np.ndarray:
     signs = np.sign(gain[:, 0] * gain[:, 1]) == np.prod(SIGNS, axis=1)
     driven = signs & np.all(np.abs(gain) > CLEAR * deviation, axis=1)
     return coasting(rate, float(np.max(windows.step.sum(axis=0))), driven, unexplained)
+
+
+def fit_without_effects(data: Data, nominal: Solution, fit: Solution, unexplained: bool) -> Solution:
+    """The fit without effects, from where another one without stands. Where it coasts for want of the effects, and the
+    `fit` with these does not, it has the rates and couplings of that: a robot that coasts predicts nothing."""
+    bare = refit(data, nominal.vector, nominal.starts, ())
+    windows = data.windows
+    which = coasts(bare, windows, unexplained) & ~coasts(fit, windows, unexplained)
+    if not np.any(which):
+        return bare
+    vector = neutral_vector(fit.vector[: len(NOMINAL)])
+    windows = windows._replace(held=np.where([*which, True, True], vector[HOLDS], windows.held))
+    return refit(data._replace(windows=windows), vector, nominal.starts, ())
 
 
 def hold_rates(windows: Windows, which: Array, told: Array | None) -> tuple[Windows, Solution]:
