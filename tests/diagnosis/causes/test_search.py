@@ -10,7 +10,7 @@ from jaxident.diagnosis.causes.columns import tabulate
 from jaxident.diagnosis.causes.discrepancy import Rest
 from jaxident.diagnosis.causes.discrepancy_basis import Term
 from jaxident.diagnosis.causes.evidence import evidence_of, log_evidence
-from jaxident.diagnosis.causes.finding import finding_of
+from jaxident.diagnosis.causes.finding import finding_of, let_go
 from jaxident.diagnosis.causes.moves import ARRIVED, better, fit_options, look_alikes, stands
 from jaxident.diagnosis.causes.search_rounds import Found, defended, settle
 from jaxident.diagnosis.causes.settled import Settled
@@ -220,6 +220,22 @@ def test_a_robot_coasts_only_if_it_does_so_with_its_effects_too(lagging):
         settled = Settled(stands(now, ()), data, tabulate(data, fit, ()), {})
         found = Found(settled, LAW, LAW, Rest([], np.zeros(0), LAW, 0.0), None, nominal)
         assert found.coasting.tolist() == [coasting, coasting]
+
+
+def test_held_rates_are_let_go_once_an_effect_is_found(lagging):
+    """A search ended with both rates held at half of what they are."""
+    data, free = nominal_fit(lagging)
+    held = data._replace(windows=lagging._replace(held=np.array([np.log(1.5), np.log(2.5), 0.0, 0.0])))
+    fit = refit(held, free.vector, free.starts, ("motor_lag",))
+    assert np.exp(fit.vector[:2]) == pytest.approx([1.5, 2.5])
+    prepared = SimpleNamespace(windows=lagging, nominal=free)
+    for effects, found in ((("motor_lag",), True), ((), False)):
+        settled = Settled(stands(fit, effects), held, tabulate(held, fit, effects), {})
+        gone = let_go(prepared, Found(settled, LAW, LAW, Rest([], np.zeros(0), LAW, 0.0), None, fit))
+        assert (gone is not None) == found
+        if found:
+            assert gone.settled.now.effects == ("motor_lag",)
+            assert np.exp(gone.settled.now.fit.vector[:2]) == pytest.approx([3.0, 5.0], rel=0.05)
 
 
 def test_a_refit_that_begins_at_a_robot_that_runs_away_begins_without_coupling():
