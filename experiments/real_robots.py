@@ -3,11 +3,11 @@
     python -m experiments.real_robots --data ../shared/data --out real_robots [--robots 1 2]
 
 Five iRobot Create robots (UTIAS MRCLAM dataset 6, Leung et al. 2011; motion capture): identified on the first half of
-each log, predicted 10 s ahead on the second. A Husky (norlab-ulaval DRIVE; lidar): identified on 400 of its windows,
-predicted 1 s ahead on the other 203. The paper's method; maximum likelihood under the noise law that it finds; the
-nominal and the corrected model of `jaxident diagnose` on the same rows (with `--diagnose`, some minutes a robot); and a
-robot that does what it is told: the last measured pose, moved on with the commanded speeds. One picture per robot, of
-the last model, and a table: errors as medians and root mean squares over the starts.
+each log, predicted 10 s ahead on the second. A Husky (norlab-ulaval DRIVE; lidar): identified on the windows of two in
+three commands, predicted 1 s ahead on those of the third. The paper's method; maximum likelihood under the noise law
+that it finds; the nominal and the corrected model of `jaxident diagnose` on the same rows (with `--diagnose`, some
+minutes a robot); and a robot that does what it is told: the last measured pose, moved on with the commanded speeds. One
+picture per robot, of the last model, and a table: errors as medians and root mean squares over the starts.
 """
 
 import argparse
