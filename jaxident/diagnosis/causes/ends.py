@@ -23,9 +23,9 @@ six, where both foretell alike. No other value was tried."""
 
 def best_end(prepared: Prepared, ends: Sequence[Found]) -> Found:
     """The end with the highest log evidence, or one that foretells better the rows that fit. Judging rows are not
-    looked at."""
+    looked at. Where no row that fits can be foretold evidence decides alone."""
     first, *others = sorted(ends, key=lambda end: -end.log_evidence)
-    if not others:
+    if not others or not len(prepared.naming.row):
         return first
     fitted = on_fitted(prepared)
     best, squares = first, misses(fitted, first)

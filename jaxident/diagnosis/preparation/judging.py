@@ -47,6 +47,8 @@ def on_fitted(prepared: Prepared) -> Prepared:
 
 def some_of(starts: Starts, most: int) -> Starts:
     """At most so many of some starts, spread evenly."""
+    if len(starts.row) <= most:
+        return starts
     chosen = np.unique(np.linspace(0, len(starts.row) - 1, most).round().astype(int))
     return Starts(starts.run[chosen], starts.row[chosen])
 

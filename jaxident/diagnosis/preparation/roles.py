@@ -12,7 +12,8 @@ from jaxident.log import Log, run_begins
 FEWEST_RUNS = 3
 """Runs from which on whole runs have a role; fewer are cut into parts."""
 GOLDEN, FIRST, SHARE = (5.0**0.5 - 1.0) / 2.0, 0.45, 1.0 / 3.0
-"""The step from run to run, the first place and the width of those that judge (`judging`)."""
+"""The step from run to run, the first place and the width of those that judge (`judging`). With this first place the
+second and the fifth of six runs judge; no other was tried."""
 LONGEST = 1000
 """Rows of a piece that is fitted: a scan over the commands of one longer run takes as long as that over many."""
 PARTS = 36
@@ -43,7 +44,7 @@ def split(log: Log, rows: int) -> Roles:
         size = max(2 * rows, -(-sum(len(run.t) for run in runs) // PARTS))
         parts = [part for k, run in enumerate(runs) for part in _parts(k, 0, len(run.t), size)]
     judges = judging(len(parts))
-    fitted = [part for part, judging in zip(parts, judges, strict=True) if not judging]
+    fitted = [part for part, alone in zip(parts, judges, strict=True) if not alone]
     size = max(rows, LONGEST // rows * rows)
     fit = [_piece(*short, lead) for part in fitted for short in _parts(*part, size)]
     judge = [_piece(*part, lead) for part in itertools.compress(parts, judges)]

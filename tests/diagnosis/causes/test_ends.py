@@ -12,6 +12,7 @@ from jaxident.diagnosis.preparation.judging import on_fitted
 from jaxident.diagnosis.preparation.prepare import prepare
 from jaxident.effects.coordinates import PLACES, neutral_vector, nominal_vector
 from jaxident.effects.simulate import simulate
+from jaxident.estimation.ahead.stretches import Starts
 from jaxident.estimation.predict import predict
 from jaxident.log import Log
 from jaxident.robot.drive import Physical
@@ -77,6 +78,8 @@ def test_evidence_decides_between_ends_that_foretell_alike(prepared):
     ends = [end(prepared, evidence) for evidence in (1.0, 3.0, 2.0)]
     assert best_end(prepared, ends) is ends[1]
     assert best_end(prepared, ends[:1]) is ends[0]
+    nothing = prepared._replace(naming=Starts(np.zeros(0, int), np.zeros(0, int)))
+    assert best_end(nothing, ends) is ends[1]
 
 
 def test_chance_alone_foretells_better_in_one_case_of_six():
