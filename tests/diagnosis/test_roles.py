@@ -97,11 +97,22 @@ def test_of_a_long_log_parts_that_tell_most_have_a_role(rows, runs):
         assert late > 0.75
 
 
+def test_of_many_short_runs_as_many_rows_have_a_role_as_of_long_ones():
+    """603 runs of 40 rows, as a Husky's log has: pieces are shorter than SHORT, so that more of them are needed."""
+    rng, (log, _) = np.random.default_rng(0), driven(40, 603, 1.0)
+    factor = np.repeat(rng.uniform(0.2, 1.0, 603), 40)  # every run has one command, small or large
+    log = log._replace(u_r=factor, u_l=-0.7 * factor)
+    roles = split(log, 40)
+    fit, judge = (rows_of(log, pieces) for pieces in roles)
+    assert 0.8 * MOST_FITTED < len(fit) <= MOST_FITTED
+    assert 0.8 * MOST_JUDGED < len(judge) <= MOST_JUDGED
+
+
 def test_where_all_rows_tell_alike_parts_lie_evenly():
     log, _ = driven(90_000, 1, 1.0)
     fit = split(log, ROWS).fit
     apart = np.diff([piece.first for piece in fit])
-    assert len(fit) * SHORT == MOST_FITTED
+    assert 0.95 * MOST_FITTED < sum(piece.last - piece.first for piece in fit) <= MOST_FITTED
     assert max(apart) < 3 * 90_000 / len(fit)
 
 

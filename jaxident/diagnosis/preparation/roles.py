@@ -24,6 +24,10 @@ of 1,000,000 rows 32 s (`experiments/speed.md`); no other numbers were tried. Up
 SHORT = 400
 """Rows of the pieces among which those that tell most are chosen. No other number was tried."""
 
+MORE_STEPS, FINER = 2, 1.1
+"""Steps at most, over the pieces of mean length that have as many rows as are wanted, and the factor from one trial to
+the next. Where a robot stands most of the time, more steps would choose the pieces where it stands. No others tried."""
+
 
 class Roles(NamedTuple):
     """Pieces that are fitted, and pieces that judge alone."""
@@ -72,18 +76,24 @@ def _rows_in(pieces: list[Piece]) -> int:
 
 
 def _most_telling(log: Log, pieces: list[Piece], most: int, rows: int, lead: int) -> list[Piece]:
-    """The pieces, or short ones of them that have `most` rows together, at even steps of the information that the
-    commands have gathered since the log began: many where the robot moves anyhow, few where it stands."""
+    """The pieces, or short ones of them that have `most` rows together at most, at even steps of the information that
+    the commands have gathered since the log began: many where the robot moves anyhow, few where it stands. Of short
+    runs, and where several steps fall on one piece, more steps are needed for as many rows."""
     if _rows_in(pieces) <= most:
         return pieces
     size, told = max(rows, SHORT // rows * rows), np.concatenate([[0.0], np.cumsum(leverages(log))])
     parts = [part for piece in pieces for part in _parts(piece.run, piece.first, piece.last, size)]
     short = [_piece(*part, lead) for part in parts]
     begins = run_begins(log)
-    own = [told[begins[piece.run] + piece.last] - told[begins[piece.run] + piece.first] for piece in short]
-    gathered = np.cumsum(own)
-    steps = (np.arange(most // size) + 0.5) * gathered[-1] / (most // size)
-    return [short[k] for k in np.unique(np.searchsorted(gathered, steps))]
+    gathered = np.cumsum([told[begins[p.run] + p.last] - told[begins[p.run] + p.first] for p in short])
+    chosen, steps, largest = short[:0], most // size, MORE_STEPS * most * len(short) // _rows_in(short)
+    while steps <= largest:
+        middles = (np.arange(steps) + 0.5) * gathered[-1] / steps
+        found = [short[k] for k in np.unique(np.searchsorted(gathered, middles))]
+        if len(chosen) < len(found) and _rows_in(found) <= most:
+            chosen = found
+        steps = max(steps + 1, int(FINER * steps))
+    return chosen
 
 
 def leverages(log: Log) -> np.ndarray:
