@@ -30,8 +30,7 @@ def at_most(cores: int | None) -> Iterator[None]:
 def in_parallel(
     function: Callable[..., Any], blocks: Sequence[tuple[Any, ...]], cores: int | None = None, *, ahead: bool = True
 ) -> list[Any]:
-    """The results of a function on blocks of arguments in their order: of a compiled one on blocks of one shape, or of
-    several whose compilation is to run side by side.
+    """The results of a compiled function on blocks of arguments, all of one shape, in their order.
 
     One thread per core (`cores`: how many, by default all, or what `at_most` says) takes the next block when it is
     done with one. The program is compiled once and releases Python while it runs; no data pass between the blocks, so

@@ -11,7 +11,6 @@ from jaxident.estimation.poses.parameters import Law, names
 from jaxident.estimation.poses.prior import RATE, SIGNS, Prior, coasting, middle_gain, prior_of
 from jaxident.estimation.poses.residual_tests import whiteness
 from jaxident.estimation.poses.runs import Runs
-from jaxident.parallel import in_parallel
 
 NOISE_LAWS = {
     "white": Law(),
@@ -46,9 +45,9 @@ def fit_law(runs: Runs, d_max: Array, noise_law: str, coupling: bool) -> tuple[F
     terms = {"coupling": coupling, "wheels": runs.wheels is not None}
     tried: list[tuple[Fit, Law]] = []
     for kinds in (("white",), ("ar1", "slip"), ("slip-ar1",)) if noise_law == "auto" else ((noise_law,),):
-        laws = [NOISE_LAWS[name]._replace(**terms) for name in kinds]
-        fits, beginning = fit_each(beginning, runs, d_max, laws, prior)
-        tried += zip(fits, laws, strict=True)
+        for law in (NOISE_LAWS[name]._replace(**terms) for name in kinds):
+            fit, beginning = fit_twice(beginning, runs, d_max, law, prior)
+            tried.append((fit, law))
         fit, law = likeliest(tried, runs)
         if bool(fit.ok) and colour(fit, runs) < WHITE:
             break
@@ -57,25 +56,10 @@ def fit_law(runs: Runs, d_max: Array, noise_law: str, coupling: bool) -> tuple[F
     return settling_fit(beginning, runs, d_max, laws, fit) or (fit, law)
 
 
-def fit_each(
-    beginning: Beginning, runs: Runs, d_max: Array, laws: list[Law], prior: Prior
-) -> tuple[list[Fit], Beginning]:
-    """The fits under some laws, and where the last began. They run side by side: most of a first call is compilation.
-    One that ends at another beginning (`fit_twice`) is that of the laws after it."""
-    searched = in_parallel(lambda law: fit_from(beginning, runs, d_max, law, prior), [(law,) for law in laws])
-    fits, here = [], beginning
-    for law, fit in zip(laws, searched, strict=True):
-        first = fit if here is beginning else fit_from(here, runs, d_max, law, prior)
-        found, here = fit_twice(jax.device_get(first), here, runs, d_max, law, prior)
-        fits.append(found)
-    return fits, here
-
-
-def fit_twice(
-    fit: Fit, beginning: Beginning, runs: Runs, d_max: Array, law: Law, prior: Prior
-) -> tuple[Fit, Beginning]:
+def fit_twice(beginning: Beginning, runs: Runs, d_max: Array, law: Law, prior: Prior) -> tuple[Fit, Beginning]:
     """The fit from a beginning, and that beginning. Where the search does not arrive, one from the prior's middle takes
     its place if it is as likely; under slip one search is long enough."""
+    fit = jax.device_get(fit_from(beginning, runs, d_max, law, prior))
     if bool(fit.ok) or law.slip:
         return fit, beginning
     nothing = beginning.estimate._replace(gain=middle_gain(prior), dead_zone=jnp.zeros(2))
@@ -101,8 +85,8 @@ def settling_fit(beginning: Beginning, runs: Runs, d_max: Array, laws: list[Law]
     rate = jnp.where(held, RATE, jnp.asarray(fit.robot.drive.rate))
     estimate = estimate._replace(rate=rate, gain=jnp.asarray(middle_gain(prior)), dead_zone=jnp.zeros(2))
     begin = beginning._replace(estimate=estimate)
-    fits = in_parallel(lambda law: fit_from(begin, runs, d_max, law, prior), [(law,) for law in laws])
-    found = likeliest(list(zip(jax.device_get(fits), laws, strict=True)), runs)
+    tried = [(jax.device_get(fit_from(begin, runs, d_max, law, prior)), law) for law in laws]
+    found = likeliest(tried, runs)
     return found if bool(found[0].ok) else None
 
 
