@@ -79,11 +79,11 @@ def search(windows: Windows, nominal: Solution, without: Collection[str] = (), l
     """The ends of a search for the effects of some windows, from a nominal fit. `without`: effects that the catalogue
     is to lack. A law that is given stays as it is.
 
-    The search begins at white noise. Where its end leaves something, a second search begins at noise as the nominal
-    fit leaves it (`ends.best_end` chooses). A nominal model misses a real robot by twenty times the camera's error, and
-    a search that takes all of that for effects may lose its way. Where both ends are worse than no effect at all, the
-    only end has no effect. Where the robot coasts, with its effects too, the first end is the only one: its rates are to
-    be held, and the search made again (`finding.find_effects`).
+    The search begins at white noise. Where its end leaves something, a second search begins at noise as the nominal fit
+    leaves it (`ends.best_end` chooses). A nominal model misses a real robot by twenty times the camera's error, and a
+    search that takes all of that for effects may lose its way. Where both ends are worse than no effect at all, the
+    only end has no effect. Where the robot coasts, with its effects too, the first end is the only one: its rates are
+    to be held, and the search made again (`finding.find_effects`).
     """
     begin, sized, without = Move(nominal, (), -nominal.cost), law is None, {*without, *untold(windows)}
     wheel = first_noise(nominal.linear.rims, np.exp(nominal.vector[:2]), windows)
