@@ -40,11 +40,10 @@ def in_parallel(
     """
     if cores is None:
         cores = _most_cores.get() or (os.cpu_count() if card_memory() is None else 1)
-
-    same = as_precise(function)
+    precise = as_precise(function)
 
     def run(block: tuple[Any, ...]) -> Any:
-        return jax.block_until_ready(same(*block))
+        return jax.block_until_ready(precise(*block))
 
     alone = 0 if ahead else 1
     first, others = [run(block) for block in blocks[:alone]], blocks[alone:]

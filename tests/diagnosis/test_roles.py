@@ -15,9 +15,9 @@ from jaxident.diagnosis.preparation.roles import (
     MOST_FITTED,
     MOST_JUDGED,
     PARTS,
-    judging,
     leverages,
     split,
+    which_judge,
 )
 from jaxident.effects.coordinates import PLACES, neutral_vector, nominal_vector
 from jaxident.effects.simulate import simulate
@@ -59,14 +59,14 @@ def test_every_row_has_one_role_and_a_third_judges(rows, runs):
 @pytest.mark.parametrize("period", range(1, 13))
 def test_runs_of_every_phase_of_a_period_fit_and_judge_alike(period):
     """Of 60 runs of each phase 16 to 24 judge; if every third run judged, all of a phase or none would, at period 3."""
-    judges = np.array(judging(60 * period))
+    judges = np.array(which_judge(60 * period))
     for phase in range(period):
         assert np.sum(judges[phase::period]) == pytest.approx(20, abs=4)
 
 
 def test_from_three_runs_on_each_purpose_has_some_and_judging_runs_lie_apart():
     for count in range(3, 100):
-        judges = np.flatnonzero(judging(count))
+        judges = np.flatnonzero(which_judge(count))
         assert 0.2 < len(judges) / count < 0.45
         assert set(np.diff(judges)) <= {2, 3, 5}
 

@@ -94,22 +94,24 @@ def fit_without_effects(data: Data, nominal: Solution, fit: Solution, unexplaine
     """The fit without effects, from where another one without stands. Where it coasts for want of the effects, and the
     `fit` with these does not, it has the rates and couplings of that: a robot that coasts predicts nothing."""
     bare = refit(data, nominal.vector, nominal.starts, ())
-    windows = data.windows
-    which = coasts(bare, windows, unexplained) & ~coasts(fit, windows, unexplained)
+    which = coasts(bare, data.windows, unexplained) & ~coasts(fit, data.windows, unexplained)
     if not np.any(which):
         return bare
     vector = neutral_vector(fit.vector[: len(NOMINAL)])
-    windows = windows._replace(held=np.where([*which, True, True], vector[HOLDS], windows.held))
-    return refit(data._replace(windows=windows), vector, nominal.starts, ())
+    held = data._replace(windows=_held_at(vector[HOLDS], which, data.windows))
+    return refit(held, vector, nominal.starts, ())
 
 
 def hold_rates(windows: Windows, which: Array, told: Array | None) -> tuple[Windows, Solution]:
     """The windows with some rates (2,) and both couplings held, and the nominal fit to them. told (10,): coordinates of
     a given nominal model, where they are held then."""
-    held, middle = np.array(windows.held), MIDDLE if told is None else np.asarray(told)[HOLDS]
-    chosen = np.array([*which, True, True])
-    windows = windows._replace(held=np.where(chosen, middle, held))
+    windows = _held_at(MIDDLE if told is None else np.asarray(told)[HOLDS], which, windows)
     return windows, lower_valley(rough_fit(windows, neutral_vector(steady_point(windows))), windows)
+
+
+def _held_at(middle: Array, which: Array, windows: Windows) -> Windows:
+    """The windows with some rates (2,) and both couplings held where `middle` (4,) has them."""
+    return windows._replace(held=np.where([*which, True, True], middle, windows.held))
 
 
 def lower_valley(fit: Solution, windows: Windows) -> Solution:

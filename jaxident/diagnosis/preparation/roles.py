@@ -12,8 +12,8 @@ from jaxident.log import Log, run_begins
 FEWEST_RUNS = 3
 """Runs from which on whole runs have a role; fewer are cut into parts."""
 GOLDEN, FIRST, SHARE = (5.0**0.5 - 1.0) / 2.0, 0.45, 1.0 / 3.0
-"""The step from run to run, the first place and the width of those that judge (`judging`). With this first place the
-second and the fifth of six runs judge; no other was tried."""
+"""The step from run to run, the first place and the width of those that judge (`which_judge`). With this first place
+the second and the fifth of six runs judge; no other was tried."""
 LONGEST = 1000
 """Rows of a piece that is fitted: a scan over the commands of one longer run takes as long as that over many."""
 PARTS = 36
@@ -23,10 +23,10 @@ MOST_FITTED, MOST_JUDGED = 16_000, 8_000
 of 1,000,000 rows 32 s (`experiments/speed.md`); no other numbers were tried. Up to some 21,000 rows are all used."""
 SHORT = 400
 """Rows of the pieces among which those that tell most are chosen. No other number was tried."""
-
 MORE_STEPS, FINER = 2, 1.1
-"""Steps at most, over the pieces of mean length that have as many rows as are wanted, and the factor from one trial to
-the next. Where a robot stands most of the time, more steps would choose the pieces where it stands. No others tried."""
+"""How many steps are tried at most, as a multiple of the pieces of mean length that have the rows wanted, and the
+factor from one trial to the next. With these, four fifths of the rows chosen are from where the robot moves, if it
+stands for four fifths of the time. No others were tried."""
 
 
 class Roles(NamedTuple):
@@ -47,7 +47,7 @@ def split(log: Log, rows: int) -> Roles:
     else:
         size = max(2 * rows, -(-sum(len(run.t) for run in runs) // PARTS))
         parts = [part for k, run in enumerate(runs) for part in _parts(k, 0, len(run.t), size)]
-    judges = judging(len(parts))
+    judges = which_judge(len(parts))
     fitted = [part for part, alone in zip(parts, judges, strict=True) if not alone]
     size = max(rows, LONGEST // rows * rows)
     fit = [_piece(*short, lead) for part in fitted for short in _parts(*part, size)]
@@ -55,7 +55,7 @@ def split(log: Log, rows: int) -> Roles:
     return Roles(_most_telling(log, fit, MOST_FITTED, rows, lead), _most_telling(log, judge, MOST_JUDGED, rows, lead))
 
 
-def judging(count: int) -> list[bool]:
+def which_judge(count: int) -> list[bool]:
     """Which of some runs judge: the second, the fifth and so on, two to five apart, a third of all.
 
     Multiples of the golden ratio, less their whole parts, fill 0 to 1 evenly, and so do every second, every third or
