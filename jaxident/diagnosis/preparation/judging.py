@@ -22,9 +22,10 @@ class Judged(NamedTuple):
     there sees it.
 
     error (starts, 3): measured less predicted, NaN where the prediction is not finite; start, slip (starts, 3, 3):
-    covariance by what is not known of the start state, and by slip since; slopes (directions, starts, 3): a
-    deviation's worth of each independent direction of the model's parameters; path (starts, rows, 3): predicted poses;
-    run_up (starts,): starts where the filter did not converge.
+    covariance by what is not known of the start state, and by slip since, that of a start where the filter did not
+    converge as at the others; slopes (directions, starts, 3): a deviation's worth of each independent direction of the
+    model's parameters; path (starts, rows, 3): predicted poses; run_up (starts,): starts where the filter did not
+    converge.
     """
 
     error: Any
@@ -61,9 +62,19 @@ def judge_model(model: Model, prepared: Prepared) -> Judged:
     error = measured - ahead.pose[:, -1]
     error[:, 2] = (error[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
     turn = into_channels(measured[:, 2])
-    start, slip = (turn @ part[:, -1] @ turn.transpose(0, 2, 1) for part in (ahead.start, ahead.slip))
+    start, slip = (
+        _as_others(turn @ part[:, -1] @ turn.transpose(0, 2, 1), ahead.run_up) for part in (ahead.start, ahead.slip)
+    )
     slopes = np.einsum("sij,dsj->dsi", turn, ahead.parameters[:, :, -1])
     return Judged((turn @ error[..., None])[..., 0], start, slip, slopes, ahead.pose, ahead.run_up)
+
+
+def _as_others(covariance: Array, run_up: Array) -> np.ndarray:
+    """Covariances (starts, 3, 3), those of run-ups as the others have them on the mean, if there are others. A run-up
+    knows of its speeds what is known of any robot's. On a Husky one of 104 starts was one: it alone foretold 374 mm for
+    the root mean square of all, which came out as 158 mm."""
+    known = covariance[~run_up]
+    return np.where(run_up[:, None, None], np.mean(known, axis=0), covariance) if len(known) else covariance
 
 
 def into_channels(heading: Array) -> np.ndarray:

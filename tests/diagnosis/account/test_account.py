@@ -191,6 +191,24 @@ def test_slip_that_foretells_more_than_there_is_is_taken_back():
     assert slip_seen(model, prepared, LAWS["white"][0]) == 1.0
 
 
+def test_a_start_from_a_run_up_does_not_foretell_for_all():
+    """Poses before one start jump about. A robot that hardly settles has no speed that its commands alone would tell:
+    one such start in 54 made the mean expected squares 97 to 821 times as large."""
+    law, _ = LAWS["white"]
+    model, prepared = driven(law, runs=6)
+    slow = dataclasses.replace(model, dynamics=model.dynamics._replace(rate=np.array([0.01, 0.01])))
+    calm = judge_model(slow, prepared)
+    row = prepared.judging.row[20] + prepared.judging.run[20] * 291
+    x = prepared.log.x.copy()
+    x[row - 18 : row] += 0.5 * (-1.0) ** np.arange(18)
+    judged = judge_model(slow, prepared._replace(log=prepared.log._replace(x=x)))
+    assert np.flatnonzero(judged.run_up).tolist() == [20]
+    others = np.arange(54) != 20
+    for own, before in zip(judged.squares, calm.squares, strict=True):
+        np.testing.assert_allclose(own[20], own[others].mean(axis=0))
+        np.testing.assert_allclose(own[others], before[others], rtol=1e-6)
+
+
 def test_a_law_that_is_hardly_known_widens_the_floor():
     law, _ = LAWS["slipping"]
     model, prepared = driven(law, runs=6)
