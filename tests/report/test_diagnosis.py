@@ -131,6 +131,20 @@ def test_the_account_is_the_first_picture_and_the_first_lines():
     assert plain_spaces(places_line(found.account)) in [plain_spaces(b) for b in part.blocks if isinstance(b, str)]
 
 
+def test_noise_that_would_make_more_than_is_left_is_told():
+    """A Husky's account once had -443 % without a name, and no word on what that means."""
+    found = made_up("effects")
+    *others, rest = found.account.rows
+    for high, told in ((0.01, False), (-0.02, True)):
+        row = rest._replace(share=-0.1, interval=(-0.3, high))
+        account = found.account._replace(rows=[*others, row])
+        (part, *_) = diagnosis_page(found._replace(account=account), "runs").sections
+        on_page = [block for block in part.blocks if isinstance(block, str) and "smaller than shown" in block]
+        in_terminal = [line for line in account_lines(account) if "smaller than shown" in line]
+        assert len(on_page) == len(in_terminal) == told
+        assert all("by 10 % of the error" in plain_spaces(line) for line in on_page + in_terminal)
+
+
 def test_delay_and_drag_lie_before_the_wheel_and_slip_after_it():
     account = made_up("effects").account
     places = account.places
