@@ -73,8 +73,10 @@ def _as_others(covariance: Array, run_up: Array) -> np.ndarray:
     """Covariances (starts, 3, 3), those of run-ups as the others have them on the mean, if there are others. A run-up
     knows of its speeds what is known of any robot's. On a Husky one of 104 starts was one: it alone foretold 374 mm for
     the root mean square of all, which came out as 158 mm."""
-    known = covariance[~run_up]
-    return np.where(run_up[:, None, None], np.mean(known, axis=0), covariance) if len(known) else covariance
+    found, known = np.array(covariance), ~np.asarray(run_up)
+    if known.any():
+        found[~known] = np.mean(found[known], axis=0)
+    return found
 
 
 def into_channels(heading: Array) -> np.ndarray:
