@@ -9,7 +9,7 @@ from jaxident.diagnosis.causes.columns import answers_of, tabulate
 from jaxident.diagnosis.causes.discrepancy import UNEXPLAINED
 from jaxident.diagnosis.causes.evidence import worth
 from jaxident.diagnosis.causes.found import Found
-from jaxident.diagnosis.causes.moves import fit_options, ranked
+from jaxident.diagnosis.causes.moves import Move, fit_options, ranked
 from jaxident.diagnosis.causes.search import MOST_EFFECTS
 from jaxident.diagnosis.causes.settled import noise_beside
 
@@ -36,9 +36,7 @@ def defended(found: Found) -> Found:
         owners = [name for name in owners if name != table.options[weakest].effect]
         fewer = fit_options(data, table, now, [k for k in here if k != weakest])
         assert fewer is not None  # no limit was set
-        now, tried = fewer, {key: v + now.evidence - fewer.evidence for key, v in state.tried.items()}
-        state = state._replace(now=now, tried=tried, answers=None)
-        found = found._replace(settled=state, rest=noise_beside(data, now.fit, found.law, sized=False)[1])
+        found = _at(found, fewer)
 
 
 def renamed(found: Found, without: Collection[str] = ()) -> Found:
@@ -47,9 +45,13 @@ def renamed(found: Found, without: Collection[str] = ()) -> Found:
     A name that was put together for what has no name may keep a true one out. Once it has left, a term stands where the
     true name could. On half a log of a Create such a term was that of its turn loss.
     """
+    before = found
     while (better := _one_renamed(found, without)) is not None:
         found = better
-    return found
+    if found is before:
+        return found
+    now = found.settled.now
+    return found._replace(likely=noise_beside(found.settled.data, now.fit, found.law)[0])
 
 
 def _one_renamed(found: Found, without: Collection[str]) -> Found | None:
@@ -63,16 +65,21 @@ def _one_renamed(found: Found, without: Collection[str]) -> Found | None:
         others = np.delete(rest.answers, place, axis=2)
         table = tabulate(state.data, now.fit, now.effects, others, free=True, answers=answers)
         here = [table.here[name] for name in now.effects]
-        for k, _ in ranked(table, here, without)[:1]:
-            if worth(table, [*here, k], k).evidence < SURE:
-                continue
-            more = fit_options(state.data, table, now, [*here, k])
-            assert more is not None  # no limit was set
-            left = noise_beside(state.data, more.fit, found.law, sized=False)[1]
-            other = defended(found._replace(settled=state._replace(now=more, answers=None), rest=left))
-            if other.log_evidence > found.log_evidence:
-                return other
+        best = next((k for k, _ in ranked(table, here, without)), None)
+        if best is None or worth(table, [*here, best], best).evidence < SURE:
+            continue
+        more = fit_options(state.data, table, now, [*here, best])
+        assert more is not None  # no limit was set
+        other = defended(_at(found, more))
+        if other.log_evidence > found.log_evidence:
+            return other
     return None
+
+
+def _at(found: Found, move: Move) -> Found:
+    """The search at another fit, and what that leaves without a name under the same law."""
+    left = noise_beside(found.settled.data, move.fit, found.law, sized=False)[1]
+    return found._replace(settled=found.settled.at(move), rest=left)
 
 
 def _owners(found: Found) -> list[str]:
