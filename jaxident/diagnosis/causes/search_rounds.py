@@ -78,8 +78,8 @@ def crossed(windows: Windows, nominal: Solution, ends: list[Found], without: Col
     evidence; none where both have the same effects, or the first has none.
 
     A search sizes the noise beside its effects, and looks for effects beside that noise: either may hold the other
-    where it is. On two halves of a Create's log such a search ended 99 and 155 above both others in log evidence. It
-    named the delay of the other Creates where an end had a limit of the command's rate, and their turn loss.
+    where it is. On two halves of a Create's log such a search ended 99 and 85 above the better of both in log evidence.
+    It named the delay of the other Creates where that had a limit of the command's rate, and their turn loss.
     """
     worse, better = sorted(ends, key=lambda end: end.log_evidence)
     now = worse.settled.now
