@@ -36,9 +36,6 @@ LAST_ROUNDS = 6
 tried."""
 SINGLES = 8
 """Effects refitted alone before a second search. No other number was tried."""
-MANY = 3
-"""Effects from which on a search is made from a second beginning though it leaves nothing: on simulated robots with one
-or two it found them all. No other number was tried."""
 SENT, TERMS = 13.0, 2.0
 """Log-likelihood for which lost commands are believed, and how many times what the largest term in no catalogue brings
 they must bring: where something is missing that has no name, as much is made up easily."""
@@ -48,12 +45,14 @@ def search(windows: Windows, nominal: Solution, without: Collection[str] = (), l
     """The ends of a search for the effects of some windows, from a nominal fit. `without`: effects that the catalogue
     is to lack. A law that is given stays as it is.
 
-    The search begins at white noise. Where its end leaves something, or has MANY effects, a second search begins at
-    noise as the nominal fit leaves it. A nominal model misses a real robot by twenty times the camera's error, and a
-    search that takes all of that for effects may lose its way. A third one begins at what both have found (`crossed`).
-    `ends.best_end` chooses. Where all ends are worse than no effect at all, the only end has no effect. Where the robot
-    coasts, with its effects too, the first end is the only one: its rates are to be held, and the search made again
-    (`finding.find_effects`).
+    The search begins at white noise. Where its end leaves something, a second search begins at noise as the nominal fit
+    leaves it. A nominal model misses a real robot by twenty times the camera's error, and a search that takes all of
+    that for effects may lose its way. A third one begins at what both have found (`crossed`). `ends.best_end` chooses.
+    Where all ends are worse than no effect at all, the only end has no effect. Where the robot coasts, with its effects
+    too, the first end is the only one: its rates are to be held, and the search made again (`finding.find_effects`).
+
+    Three beginnings for every end with three effects or more were tried. On a Husky's log, where the first end leaves
+    nothing, an end without any effect then had more evidence: 185 mm off unseen runs, in place of 130.
     """
     begin, sized, without = Move(nominal, (), -nominal.cost), law is None, {*without, *untold(windows)}
     wheel = first_noise(nominal.linear.rims, np.exp(nominal.vector[:2]), windows)
@@ -61,7 +60,7 @@ def search(windows: Windows, nominal: Solution, without: Collection[str] = (), l
     ends = [first := climb(windows, nominal, begin, law, without, sized)]
     if sized and np.any(first.coasting):
         return ends
-    if sized and (first.rest.terms or first.worse_than_none or len(first.settled.now.effects) >= MANY):
+    if sized and (first.rest.terms or first.worse_than_none):
         responses = respond(np.exp(nominal.vector[:2]), nominal.linear.residual, windows)
         law = size_noise(nominal.linear.residual, nominal.linear.starts, windows, responses)._replace(wheel=wheel)
         single = best_single(windows, nominal, law, without)
