@@ -130,7 +130,7 @@ RECORDS = (
         source="slew limit of motor drivers; Franklin, Powell, Emami-Naeini, ch. 9",
         parameters=(Parameter("rate", f"{UNIT}/s", float("inf"), (1.0, 50.0), 5.0, least=0.0, above=True),),
         channels=BOTH,
-        act=input_rate_limit, fast=rate_limit_by_inverse, confused_with=("motor_lag", "transport_delay"), smooth=False,
+        act=input_rate_limit, fast=rate_limit_by_inverse, confused_with=("motor_lag",), smooth=False,
         grid=(50.0, 20.0, 10.0, 5.0, 2.0, 1.0), sharp=True,
         search=Search((positive("inverse_rate", 2.0),),
                       Transform(lambda c: {"rate": _inverse(c["inverse_rate"])},

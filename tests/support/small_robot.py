@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from jaxident.diagnosis.causes.found import Found
-from jaxident.diagnosis.causes.search_rounds import search
+from jaxident.diagnosis.causes.search_rounds import Found, search
 from jaxident.diagnosis.fit.refit import Data, Solution, refit
 from jaxident.diagnosis.motion.linear import follow
 from jaxident.diagnosis.motion.windows import Windows, cut

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.found import Found
+from jaxident.diagnosis.causes.search_rounds import Found
 from jaxident.diagnosis.noise.law import first_law
 from jaxident.diagnosis.preparation.judging import judge_model, on_fitted
 from jaxident.diagnosis.preparation.prepare import Prepared

@@ -9,10 +9,9 @@ from jaxident.diagnosis.causes.columns import Table
 from jaxident.diagnosis.causes.discrepancy import Rest
 from jaxident.diagnosis.causes.ends import best_end
 from jaxident.diagnosis.causes.evidence import WRONG, Worth, evidence_of, worth
-from jaxident.diagnosis.causes.found import Found
 from jaxident.diagnosis.causes.moves import stands
 from jaxident.diagnosis.causes.search import joining
-from jaxident.diagnosis.causes.search_rounds import TERMS, climb, search
+from jaxident.diagnosis.causes.search_rounds import TERMS, Found, climb, search
 from jaxident.diagnosis.causes.settled import Settled
 from jaxident.diagnosis.fit.nominal import coasts, hold_rates
 from jaxident.diagnosis.fit.refit import Data, Solution, refit

@@ -32,11 +32,6 @@ class Settled(NamedTuple):
     tried: dict[frozenset[str], float]
     answers: Answers | None = None
 
-    def at(self, other: Move) -> "Settled":
-        """The same at another fit: log evidence of sets counts from there. The table stays that of the fit before."""
-        tried = {effects: value + self.now.evidence - other.evidence for effects, value in self.tried.items()}
-        return self._replace(now=other, tried=tried | {frozenset(other.effects): 0.0}, answers=None)
-
 
 def noise_beside(data: Data, fit: Solution, law: Law, sized: bool = True, memory_too: bool = True) -> tuple[Law, Rest]:
     """The likeliest law at a fit, and what is in no catalogue with the law beside it."""

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.causes.defence import SURE
 from jaxident.diagnosis.causes.finding import Finding
+from jaxident.diagnosis.causes.search_rounds import SURE
 from jaxident.diagnosis.causes.settled import LIKELY, whiten
 from jaxident.diagnosis.discovery.candidates import candidates, path_of
 from jaxident.diagnosis.discovery.curves import Bent, bend

@@ -7,15 +7,13 @@ import pytest
 from support.small_robot import LAW, VECTOR, likeliest_end, nominal_fit, robot_with, windows_of
 
 from jaxident.diagnosis.causes.columns import tabulate
-from jaxident.diagnosis.causes.defence import defended, renamed
 from jaxident.diagnosis.causes.discrepancy import Rest
 from jaxident.diagnosis.causes.discrepancy_basis import Term
 from jaxident.diagnosis.causes.evidence import evidence_of, log_evidence
 from jaxident.diagnosis.causes.finding import finding_of, let_go
-from jaxident.diagnosis.causes.found import Found
 from jaxident.diagnosis.causes.moves import ARRIVED, better, fit_options, look_alikes, stands
-from jaxident.diagnosis.causes.search_rounds import crossed, settle
-from jaxident.diagnosis.causes.settled import Settled, noise_beside
+from jaxident.diagnosis.causes.search_rounds import Found, defended, settle
+from jaxident.diagnosis.causes.settled import Settled
 from jaxident.diagnosis.fit.refit import refit
 from jaxident.diagnosis.motion.linear import linearise
 from jaxident.diagnosis.noise.law import first_law
@@ -204,42 +202,6 @@ def test_an_effect_leaves_for_a_term_that_does_the_same_only_if_terms_bring_much
     settled = Settled(now, data, tabulate(data, fit, now.effects), {})
     found = defended(Found(settled, LAW, LAW, rest, None, nominal_fit(lagging)[1]))
     assert ("motor_lag" in found.settled.now.effects) == kept
-
-
-def ended(windows, data, fit, effects):
-    """Where a search stands at a fit, with what that leaves without a name."""
-    now = stands(fit, effects)
-    rest = noise_beside(data, fit, LAW, sized=False)[1]
-    settled = Settled(now, data, tabulate(data, fit, effects), {})
-    return Found(settled, LAW, LAW, rest, None, nominal_fit(windows)[1])
-
-
-def test_a_term_gets_the_name_of_an_effect_that_can_stand_in_for_it():
-    """Beside its lag a robot loses speed in turns; the term for that does as well as the loss, without a name."""
-    windows = windows_of(robot_with({LAG: 0.1, LOSS: 0.3}))
-    before = ended(windows, *fitted(windows, ("motor_lag",), {LAG: 0.1}), ("motor_lag",))
-    assert "drive" in [term.site for term, _ in before.rest.terms]
-    after = renamed(before)
-    assert set(after.settled.now.effects) == {"motor_lag", "turn_loss"}
-    assert after.log_evidence > before.log_evidence
-    assert after.rest.gain < 0.1 * before.rest.gain
-    kept = renamed(before, without=("turn_loss",))
-    assert "turn_loss" not in kept.settled.now.effects
-    assert renamed(after) is after
-
-
-def test_ends_that_hold_different_effects_are_crossed(lagging):
-    """The lag, found under a noise law that is wrong, is kept under the better law of an end without it."""
-    data, lag = fitted(lagging, ("motor_lag",), {LAG: 0.1})
-    _, nominal = nominal_fit(lagging)
-    right, none = ended(lagging, data, lag, ("motor_lag",)), ended(lagging, data, nominal, ())
-    worse = right._replace(rest=right.rest._replace(log_likelihood=none.rest.log_likelihood - 1e4))
-    (third,) = crossed(lagging, nominal, [worse, none], ())
-    assert third.settled.now.effects == ("motor_lag",)
-    assert third.log_evidence > max(worse.log_evidence, none.log_evidence)
-    assert crossed(lagging, nominal, [right, worse], ()) == []  # the same effects
-    low = none._replace(rest=none.rest._replace(log_likelihood=right.rest.log_likelihood - 1e4))
-    assert crossed(lagging, nominal, [right, low], ()) == []  # nothing to begin at
 
 
 @pytest.mark.parametrize(("evidence", "worse"), [(-1.0, True), (1.0, False)])
