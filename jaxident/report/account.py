@@ -68,7 +68,6 @@ def account_section(account: Account, details: str = "") -> Section:
             *([details] if details else []),
             table,
             places_line(account),
-            *([told] if (told := too_much_noise(account)) else []),
         ],
     )
 
@@ -101,19 +100,6 @@ def places_line(account: Account) -> str:
     return f"Where the error lies: {', '.join(parts)}."
 
 
-def too_much_noise(account: Account) -> str:
-    """A sentence where noise would make more than is left, 95 % sure: what is not explained is below zero. Else
-    nothing."""
-    rest = [row for row in account.rows if row.part == REST and row.interval[1] < 0.0]
-    return TOO_MUCH_NOISE.format(share=percent(-rest[0].share)) if rest else ""
-
-
-TOO_MUCH_NOISE = (
-    "The noise, sized on the runs for naming, would make more than the model leaves on these runs, by {share} of the "
-    "error. So the parts of camera, start and slip are smaller than shown."
-)
-
-
 def account_lines(account: Account) -> list[str]:
     """The account as lines of text with bars."""
     shown = _shown(account)
@@ -126,5 +112,4 @@ def account_lines(account: Account) -> list[str]:
         bar = "#" * round(BAR * min(max(row.share, 0.0), 1.0))
         cells = f"{length(row.rms_position):>9} {angle(row.rms_heading):>10} {percent(row.share):>6}"
         lines.append(plain_text(f"  {name:<{width}} {cells}  {bar}").rstrip())
-    told = too_much_noise(account)
-    return [*lines, plain_text(places_line(account)), *([plain_text(told)] if told else [])]
+    return [*lines, plain_text(places_line(account))]
