@@ -10,11 +10,13 @@ from jaxident.diagnosis.causes.columns import tabulate
 from jaxident.diagnosis.causes.moves import fit_options, stands
 from jaxident.diagnosis.causes.points import at_best, points_of
 from jaxident.diagnosis.causes.search import best_set
+from jaxident.diagnosis.causes.search_rounds import search
 from jaxident.diagnosis.causes.wheel_periodicity import _travels, rhythms
 from jaxident.diagnosis.detectability import Answers, answers, replay, visible
 from jaxident.diagnosis.fit.refit import best_starts, bounds, refit
 from jaxident.diagnosis.motion.linear import follow, gram, left_over
 from jaxident.diagnosis.motion.responses import respond
+from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.preparation.dropped_commands import find_lost, gain_beyond
 from jaxident.diagnosis.preparation.pose_screening import find_more_outliers, find_outliers, has_outliers
 from jaxident.diagnosis.preparation.steps import likely_steps
@@ -122,6 +124,32 @@ def test_commands_that_came_late_are_found_one_by_one(plain):
     assert np.mean(moved[true]) > 0.5  # small changes cannot be told
     assert np.mean(moved[~true]) < 0.05  # a fit bent by late changes takes some others for late
     assert find_lost(*plain).gain < 4.0
+
+
+RULES = pytest.mark.parametrize(("rule", "by_chance"), [({}, True), ({"faster": 0.6}, False)])
+COARSE = Law(2e-3, 2e-2)
+
+
+def late_by(rule):
+    """Windows of a robot whose commands came late in every fifth place, or wherever it was fast."""
+    return windows_of(VECTOR, seed=1, late=1, law=COARSE, runs=15, **rule)
+
+
+@RULES
+def test_commands_late_by_a_rule_are_not_lost_by_chance(rule, by_chance):
+    found = find_lost(*nominal_fit(late_by(rule), COARSE))
+    assert found.gain > 100.0
+    assert found.by_chance == by_chance
+
+
+@pytest.mark.slow
+@RULES
+def test_a_search_names_only_what_was_lost_by_chance(rule, by_chance):
+    """A name for chance would hide a rule."""
+    windows = late_by(rule)
+    (end,) = search(windows, nominal_fit(windows, COARSE)[1], law=COARSE)
+    assert (end.lost is not None) == by_chance
+    assert by_chance or end.rest.terms or end.settled.now.effects
 
 
 def test_a_fit_begun_where_the_robot_runs_away_begins_without_effects(plain):

@@ -26,20 +26,21 @@ def robot_with(sizes) -> np.ndarray:
     return vector
 
 
-def windows_of(vector, seed=0, late=0, law=LAW) -> Windows:
+def windows_of(vector, seed=0, late=0, law=LAW, faster=None, runs=RUNS) -> Windows:
     """Windows of noisy poses that the follower itself makes from whole runs, so that a fit of its form is exact; every
-    fifth change of the command `late` rows."""
+    fifth change of the command `late` rows, or each one after commands whose mean is larger than `faster`."""
     rng = np.random.default_rng(seed)
-    runs, t = [], np.arange(ROWS) * STEP
-    for _ in range(RUNS):
+    logs, t = [], np.arange(ROWS) * STEP
+    for _ in range(runs):
         u = np.repeat(np.round(rng.uniform(-1.0, 1.0, (ROWS // 10, 2)), 3), 10, axis=0)
-        runs.append(make_log(t, u[:, 0], u[:, 1], 0.0 * t, 0.0 * t, 0.0 * t))
-    whole = cut(join(runs), ROWS)
-    for row in range(50, ROWS, 50):
-        whole.command[row : row + late] = whole.command[row - 1]
-    path = -follow(vector[None], np.zeros((1, 5, RUNS)), whole)[0].reshape(RUNS, ROWS, 3)
+        logs.append(make_log(t, u[:, 0], u[:, 1], 0.0 * t, 0.0 * t, 0.0 * t))
+    whole = cut(join(logs), ROWS)
+    for row in range(50, ROWS, 50) if faster is None else range(10, ROWS, 10):
+        slow = np.full(runs, False) if faster is None else abs(whole.command[row - 1].mean(axis=1)) <= faster
+        whole.command[row : row + late, ~slow] = whole.command[row - 1, ~slow]
+    path = -follow(vector[None], np.zeros((1, 5, runs)), whole)[0].reshape(runs, ROWS, 3)
     path = path + rng.normal(size=path.shape) * [law.position, law.position, law.heading]
-    poses = [log._replace(x=p[:, 0], y=p[:, 1], theta=p[:, 2]) for log, p in zip(runs, path, strict=True)]
+    poses = [log._replace(x=p[:, 0], y=p[:, 1], theta=p[:, 2]) for log, p in zip(logs, path, strict=True)]
     return cut(join(poses), 40)
 
 
@@ -48,9 +49,9 @@ def likeliest_end(windows, nominal, without=()) -> Found:
     return max(search(windows, nominal, without), key=lambda end: end.log_evidence)
 
 
-def nominal_fit(windows) -> tuple[Data, Solution]:
+def nominal_fit(windows, law=LAW) -> tuple[Data, Solution]:
     """The fit without effects under white noise as large as it was made, and its data."""
-    data = Data(windows, white_whitener(LAW, windows))
+    data = Data(windows, white_whitener(law, windows))
     begin = np.zeros((5, len(windows.run)))
     begin[:3] = windows.pose[0].T
     return data, refit(data, VECTOR, begin, ())

@@ -41,7 +41,8 @@ SURE = 2.0
 """Log evidence from which an effect is named in the end: seven times as likely as not. No other value was tried."""
 SENT, TERMS = 13.0, 2.0
 """Log-likelihood for which lost commands are believed, and how many times what the largest term in no catalogue brings
-they must bring: where something is missing that has no name, as much is made up easily."""
+they must bring: where something is missing that has no name, as much is made up easily. The first losses must be by
+chance, too; what is found later is what these have left, and is seen best of small changes."""
 
 
 class Found(NamedTuple):
@@ -130,7 +131,7 @@ def climb(
                 law = rest.law
                 continue
         more = find_lost(state.data, now.fit) if repairs < MOST_REPAIRS else None
-        if more is None or more.gain < max(SENT, TERMS * rest.largest):
+        if more is None or more.gain < max(SENT, TERMS * rest.largest) or (lost is None and not more.by_chance):
             bare = fit_without_effects(state.data, nominal, now.fit, bool(rest.terms))
             return defended(Found(state, law, likely, rest, lost, bare))
         share, gain = (0.0, 0.0) if lost is None else (lost.share, lost.gain)
