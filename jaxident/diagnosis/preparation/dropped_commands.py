@@ -10,7 +10,7 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.fit.refit import Data, Solution
-from jaxident.diagnosis.motion.linear import without_starts
+from jaxident.diagnosis.motion.linear import motion_of, without_starts
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.preparation.steps import past_zone
 
@@ -21,16 +21,16 @@ FEWEST = 5
 SHARES = np.geomspace(0.005, 0.6, 12)
 """Shares of lost commands that are tried."""
 BY_RULE = 40.0
-"""Dependence (chi-square, four degrees of freedom) from which commands are late by a rule, not by chance. Of 21
-simulated robots that lost commands, half of them with another effect beside, 19 had at most 13, the others 17 and 34.
-Where delays grew with the speed, or turning slowed driving, eight searches had 51 to 129, two 12 and 35."""
+"""Dependence (chi-square, four degrees of freedom) from which commands are late by a rule, not by chance. The first
+losses of 24 simulated robots that lost commands, half of them with another effect beside, had at most 21; those of
+eight robots whose delay grew with the speed, or that lost speed in turns by a coupling, 54 to 171."""
 MOST_ODDS = 50.0
 """Logarithm of the odds beyond which a change is late for certain: no sum overflows."""
 
 
 class Lost(NamedTuple):
     """The likeliest share of lost commands, the fall of -log p that it brings, commands (rows of a run, runs, 2) as
-    they arrived, and how far the losses depend on the command (`_dependence`)."""
+    they arrived, and how far the losses depend on the motion (`_dependence`)."""
 
     share: float
     gain: float
@@ -45,15 +45,15 @@ class Lost(NamedTuple):
 
 class _Changes(NamedTuple):
     """Changes of the command: window and row (changes,), whether they may be late (changes, LATEST), the command before
-    (changes, 2), the force of that command and by how much it changes, of driving and of turning (changes, 4), what the
-    whitened poses of their window gain where they are (changes, LATEST, numbers); those of each window; whitened
+    (changes, 2); sizes of the speeds there and of the change of the force, of driving and of turning (changes, 4); what
+    the whitened poses of their window gain where they are (changes, LATEST, numbers); those of each window; whitened
     residuals (windows, numbers)."""
 
     window: Any
     row: Any
     late: Any
     before: Any
-    force: Any
+    sizes: Any
     columns: Any
     own: list
     residual: Any
@@ -88,11 +88,12 @@ def _changes(data: Data, solution: Solution) -> _Changes:
     before = windows.command[windows.first[window] + row - 1, windows.run[window]]
     now = windows.command[windows.first[window] + row, windows.run[window]]
     zone, gain = solution.vector[6:8], solution.vector[2:6].reshape(2, 2)
-    pushed, pushes = past_zone(before, zone) @ gain.T, past_zone(now, zone) @ gain.T
-    force = np.concatenate([pushed, pushes - pushed], axis=1)
-    columns, residual = _whitened(data, solution, window, row, -force[:, 2:])
+    force = (past_zone(now, zone) - past_zone(before, zone)) @ gain.T
+    _, _, _, v, w, _ = (np.asarray(part) for part in motion_of(solution.vector, solution.starts, windows))
+    sizes = np.abs(np.column_stack([v[window, row], w[window, row], force]))
+    columns, residual = _whitened(data, solution, window, row, -force)
     own = [np.flatnonzero(window == k) for k in range(len(windows.run))]
-    return _Changes(window, row, late, before, force, columns, own, residual)
+    return _Changes(window, row, late, before, sizes, columns, own, residual)
 
 
 def _price(share: float, changes: _Changes) -> np.ndarray:
@@ -125,12 +126,12 @@ def _delayed(columns: Array, residual: Array, price: Array) -> tuple[float, np.n
 
 
 def _dependence(share: float, changes: _Changes, rows: Array) -> float:
-    """How far losses, by `rows` (changes,), depend on the command: a chi-square of four degrees of freedom, about four
-    where they strike by chance.
+    """How far losses, by `rows` (changes,), depend on speeds and changes: a chi-square of four degrees of freedom,
+    about four where they strike by chance.
 
     It is the score test of a logistic model (Cox and Hinkley, Theoretical Statistics, 1974, ch. 9): how likely each
-    change came late, less what the share says beforehand, against the sizes of the force before the change and of the
-    change. A change that the poses do not show stays as likely as before and counts for nothing.
+    change came late, less what the share says beforehand, against how fast the robot was and how large the change is. A
+    change that the poses do not show stays as likely as before and counts for nothing.
     """
     if not np.any(rows):
         return 0.0
@@ -141,8 +142,8 @@ def _dependence(share: float, changes: _Changes, rows: Array) -> float:
         left[window] -= np.sum(own[window], axis=0)
     fit = np.einsum("ckn,cn->ck", changes.columns, left) - 0.5 * np.sum(changes.columns**2, axis=2) - price
     beyond = _late(np.minimum(fit, MOST_ODDS), share) - _late(-price, share)
-    sizes, weight = np.abs(changes.force), beyond**2
-    sizes = sizes - np.average(sizes, axis=0, weights=weight)
+    weight = beyond**2
+    sizes = changes.sizes - np.average(changes.sizes, axis=0, weights=weight)
     score, variance = beyond @ sizes, (sizes.T * weight) @ sizes
     return float(score @ np.linalg.lstsq(variance, score, rcond=None)[0])
 
