@@ -11,6 +11,7 @@ from jaxident.diagnosis.causes.moves import fit_options, stands
 from jaxident.diagnosis.causes.points import at_best, points_of
 from jaxident.diagnosis.causes.search import best_set
 from jaxident.diagnosis.causes.search_rounds import search
+from jaxident.diagnosis.causes.settled import noise_beside
 from jaxident.diagnosis.causes.wheel_periodicity import _travels, rhythms
 from jaxident.diagnosis.detectability import Answers, answers, replay, visible
 from jaxident.diagnosis.fit.refit import best_starts, bounds, refit
@@ -140,6 +141,13 @@ def test_commands_late_by_a_rule_are_not_lost_by_chance(rule, by_chance):
     found = find_lost(*nominal_fit(late_by(rule), COARSE))
     assert found.gain > 100.0
     assert found.by_chance == by_chance
+
+
+@RULES
+def test_commands_late_where_the_robot_is_fast_have_terms_of_their_own(rule, by_chance):
+    data, nominal = nominal_fit(late_by(rule), COARSE)
+    rest = noise_beside(data, nominal, COARSE, sized=False)[1]
+    assert any(term.name.startswith("|v| (u") for term, _ in rest.terms) != by_chance
 
 
 @pytest.mark.slow
