@@ -11,7 +11,7 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.motion.linear import normal
-from jaxident.diagnosis.motion.responses import Responses, modelled_path
+from jaxident.diagnosis.motion.responses import Responses, modelled_path, modelled_speeds
 from jaxident.diagnosis.motion.windows import Windows
 
 LAGS = (1, 2, 4, 8)
@@ -45,13 +45,9 @@ class Corrector(NamedTuple):
 
 def library(residual: Array, windows: Windows, responses: Responses) -> Corrector:
     """All terms about the path of a model with some residuals (windows, numbers)."""
-    x, y, theta = modelled_path(residual, windows)
+    x, y, theta = path = modelled_path(residual, windows)
+    v, w = modelled_speeds(path, windows)
     step = np.asarray(windows.step).T
-    moved = [np.diff(place, axis=1, append=place[:, -1:]) for place in (x, y, theta)]
-    for place in moved:
-        place[:, -1] = place[:, -2]
-    v = (moved[0] * np.cos(theta + 0.5 * moved[2]) + moved[1] * np.sin(theta + 0.5 * moved[2])) / step
-    w = moved[2] / step
     time = windows.session[windows.run][:, None] + windows.t[windows.first, windows.run][:, None] + step.cumsum(axis=1)
     time = (time - time.mean()) / max(np.ptp(time), 1e-9)
     forces = _forces(windows, v, w, theta, x, y, time)

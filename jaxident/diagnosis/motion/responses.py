@@ -41,6 +41,17 @@ def modelled_path(residual: Array, windows: Windows) -> tuple[np.ndarray, np.nda
     return found[..., 0], found[..., 1], found[..., 2]
 
 
+def modelled_speeds(path: tuple[Array, Array, Array], windows: Windows) -> tuple[np.ndarray, np.ndarray]:
+    """v, w (windows, rows) of a path x, y, heading (windows, rows), from each row to the next; the last row has those
+    of the row before."""
+    step = np.asarray(windows.step).T
+    x, y, turned = (np.diff(place, axis=1, append=place[:, -1:]) for place in path)
+    for moved in (x, y, turned):
+        moved[:, -1] = moved[:, -2]
+    middle = path[2] + 0.5 * turned
+    return (x * np.cos(middle) + y * np.sin(middle)) / step, turned / step
+
+
 def answer_to_start(rates: Array, residual: Array, windows: Windows) -> np.ndarray:
     """Derivatives (windows, numbers, 5) of the poses by the start state x, y, heading, v, w."""
     x, y, theta = modelled_path(residual, windows)

@@ -10,8 +10,8 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.fit.refit import Data, Solution
-from jaxident.diagnosis.motion.linear import motion_of, without_starts
-from jaxident.diagnosis.motion.responses import respond
+from jaxident.diagnosis.motion.linear import without_starts
+from jaxident.diagnosis.motion.responses import modelled_path, modelled_speeds, respond
 from jaxident.diagnosis.preparation.steps import past_zone
 
 LATEST = 3
@@ -22,8 +22,9 @@ SHARES = np.geomspace(0.005, 0.6, 12)
 """Shares of lost commands that are tried."""
 BY_RULE = 40.0
 """Dependence (chi-square, four degrees of freedom) from which commands are late by a rule, not by chance. The first
-losses of 24 simulated robots that lost commands, half of them with another effect beside, had at most 21; those of
-eight robots whose delay grew with the speed, or that lost speed in turns by a coupling, 54 to 171."""
+losses of 24 simulated robots that lost commands, half of them with another effect beside, had at most 21. Where delays
+grew with the speed, or turning slowed driving, those of nine robots had 54 to 171 beside a corrector without terms for
+it (`discrepancy_basis.LATER`), and 11 to 213 beside one with them."""
 MOST_ODDS = 50.0
 """Logarithm of the odds beyond which a change is late for certain: no sum overflows."""
 
@@ -89,7 +90,7 @@ def _changes(data: Data, solution: Solution) -> _Changes:
     now = windows.command[windows.first[window] + row, windows.run[window]]
     zone, gain = solution.vector[6:8], solution.vector[2:6].reshape(2, 2)
     force = (past_zone(now, zone) - past_zone(before, zone)) @ gain.T
-    _, _, _, v, w, _ = (np.asarray(part) for part in motion_of(solution.vector, solution.starts, windows))
+    v, w = modelled_speeds(modelled_path(solution.linear.residual, windows), windows)
     sizes = np.abs(np.column_stack([v[window, row], w[window, row], force]))
     columns, residual = _whitened(data, solution, window, row, -force)
     own = [np.flatnonzero(window == k) for k in range(len(windows.run))]
