@@ -18,7 +18,15 @@ from jaxident.diagnosis.fit.refit import best_starts, bounds, refit
 from jaxident.diagnosis.motion.linear import follow, gram, left_over
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.noise.law import Law
-from jaxident.diagnosis.preparation.dropped_commands import find_lost, gain_beyond
+from jaxident.diagnosis.preparation.dropped_commands import (
+    BY_RULE,
+    LATEST,
+    _Changes,
+    _dependence,
+    _taken_at,
+    find_lost,
+    gain_beyond,
+)
 from jaxident.diagnosis.preparation.pose_screening import find_more_outliers, find_outliers, has_outliers
 from jaxident.diagnosis.preparation.steps import likely_steps
 from jaxident.effects.catalogue import CATALOGUE
@@ -136,16 +144,35 @@ def late_by(rule):
     return windows_of(VECTOR, seed=1, late=1, law=COARSE, runs=15, **rule)
 
 
+def test_losses_are_asked_whether_they_go_by_the_speed():
+    """Made-up changes whose lateness is known: by chance the chi-square of four numbers is about four; where only the
+    faster half is late, far more. Changes too small to be seen make it no larger."""
+    rng, share, seen = np.random.default_rng(0), 0.2, []
+    for faster in (False, True):
+        for _ in range(20):
+            sizes = np.abs(rng.normal(size=(800, 4)))
+            columns = sizes[:, 3, None, None] * np.cumsum(rng.normal(size=(800, LATEST, 12)), axis=1)
+            late = rng.random(800) < (2.0 * share * (sizes[:, 0] > np.median(sizes[:, 0])) if faster else share)
+            residual = rng.normal(size=(400, 12))
+            window = np.arange(800) // 2
+            np.add.at(residual, window[late], columns[late, 0])
+            own = [np.array([2 * k, 2 * k + 1]) for k in range(400)]
+            may = np.ones((800, LATEST), bool)
+            changes = _Changes(window, window, may, sizes, sizes, columns, own, residual)
+            seen.append(_dependence(share, changes, np.concatenate(_taken_at(share, changes)[1])))
+    chance, rule = seen[:20], seen[20:]
+    assert 2.0 < np.mean(chance) < 8.0
+    assert max(chance) < BY_RULE < min(rule)
+
+
+@pytest.mark.slow
 @RULES
 def test_commands_late_by_a_rule_are_not_lost_by_chance(rule, by_chance):
-    found = find_lost(*nominal_fit(late_by(rule), COARSE))
+    """They have terms of their own."""
+    data, nominal = nominal_fit(late_by(rule), COARSE)
+    found = find_lost(data, nominal)
     assert found.gain > 100.0
     assert found.by_chance == by_chance
-
-
-@RULES
-def test_commands_late_where_the_robot_is_fast_have_terms_of_their_own(rule, by_chance):
-    data, nominal = nominal_fit(late_by(rule), COARSE)
     rest = noise_beside(data, nominal, COARSE, sized=False)[1]
     assert any(term.name.startswith("|v| (u") for term, _ in rest.terms) != by_chance
 

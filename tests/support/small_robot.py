@@ -28,7 +28,7 @@ def robot_with(sizes) -> np.ndarray:
 
 def windows_of(vector, seed=0, late=0, law=LAW, faster=None, runs=RUNS) -> Windows:
     """Windows of noisy poses that the follower itself makes from whole runs, so that a fit of its form is exact; every
-    fifth change of the command `late` rows, or each one after commands whose mean is larger than `faster`."""
+    fifth change of the command `late` rows, or each one after commands whose mean is larger in size than `faster`."""
     rng = np.random.default_rng(seed)
     logs, t = [], np.arange(ROWS) * STEP
     for _ in range(runs):
