@@ -28,17 +28,22 @@ def robot_with(sizes) -> np.ndarray:
 
 def windows_of(vector, seed=0, late=0, law=LAW, faster=None, runs=RUNS) -> Windows:
     """Windows of noisy poses that the follower itself makes from whole runs, so that a fit of its form is exact; every
-    fifth change of the command `late` rows, or each one after commands whose mean is larger in size than `faster`."""
+    fifth change of the command `late` rows, or each one at which the robot is faster than `faster` [m/s]."""
     rng = np.random.default_rng(seed)
     logs, t = [], np.arange(ROWS) * STEP
     for _ in range(runs):
         u = np.repeat(np.round(rng.uniform(-1.0, 1.0, (ROWS // 10, 2)), 3), 10, axis=0)
         logs.append(make_log(t, u[:, 0], u[:, 1], 0.0 * t, 0.0 * t, 0.0 * t))
     whole = cut(join(logs), ROWS)
+
+    def path_now():
+        return -follow(vector[None], np.zeros((1, 5, runs)), whole)[0].reshape(runs, ROWS, 3)
+
+    speed = np.linalg.norm(np.diff(path_now()[..., :2], axis=1), axis=2) / STEP
     for row in range(50, ROWS, 50) if faster is None else range(10, ROWS, 10):
-        slow = np.full(runs, False) if faster is None else abs(whole.command[row - 1].mean(axis=1)) <= faster
-        whole.command[row : row + late, ~slow] = whole.command[row - 1, ~slow]
-    path = -follow(vector[None], np.zeros((1, 5, runs)), whole)[0].reshape(runs, ROWS, 3)
+        here = speed[:, row - 1] > (-1.0 if faster is None else faster)
+        whole.command[row : row + late, here] = whole.command[row - 1, here]
+    path = path_now()
     path = path + rng.normal(size=path.shape) * [law.position, law.position, law.heading]
     poses = [log._replace(x=p[:, 0], y=p[:, 1], theta=p[:, 2]) for log, p in zip(logs, path, strict=True)]
     return cut(join(poses), 40)
