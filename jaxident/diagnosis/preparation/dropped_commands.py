@@ -22,7 +22,7 @@ SHARES = np.geomspace(0.005, 0.6, 12)
 """Shares of lost commands that are tried."""
 BY_RULE = 40.0
 """Dependence (chi-square, four degrees of freedom) from which commands are late by a rule, not by chance. The first
-losses of 24 simulated robots that lost commands, half of them with another effect beside, had at most 21. Where delays
+losses of 24 simulated robots that lost commands, half of them with another effect beside, had at most 22. Where delays
 grew with the speed, or turning slowed driving, those of nine robots had 54 to 171; those of seven of them 11 to 213
 once the corrector had terms for such delays (`discrepancy_basis.LATER`)."""
 MOST_ODDS = 50.0
