@@ -35,18 +35,22 @@ def windows_of(vector, seed=0, late=0, law=LAW, faster=None, runs=RUNS) -> Windo
         u = np.repeat(np.round(rng.uniform(-1.0, 1.0, (ROWS // 10, 2)), 3), 10, axis=0)
         logs.append(make_log(t, u[:, 0], u[:, 1], 0.0 * t, 0.0 * t, 0.0 * t))
     whole = cut(join(logs), ROWS)
-
-    def path_now():
-        return -follow(vector[None], np.zeros((1, 5, runs)), whole)[0].reshape(runs, ROWS, 3)
-
-    speed = np.linalg.norm(np.diff(path_now()[..., :2], axis=1), axis=2) / STEP
-    for row in range(50, ROWS, 50) if faster is None else range(10, ROWS, 10):
-        here = speed[:, row - 1] > (-1.0 if faster is None else faster)
+    fast = np.full((runs, ROWS - 1), True)
+    if faster is not None:
+        fast = np.linalg.norm(np.diff(_path(vector, whole)[..., :2], axis=1), axis=2) > faster * STEP
+    for row in range(10, ROWS, 10) if faster is not None else range(50, ROWS, 50):
+        here = fast[:, row - 1]
         whole.command[row : row + late, here] = whole.command[row - 1, here]
-    path = path_now()
+    path = _path(vector, whole)
     path = path + rng.normal(size=path.shape) * [law.position, law.position, law.heading]
     poses = [log._replace(x=p[:, 0], y=p[:, 1], theta=p[:, 2]) for log, p in zip(logs, path, strict=True)]
     return cut(join(poses), 40)
+
+
+def _path(vector, whole: Windows) -> np.ndarray:
+    """x, y, heading (runs, ROWS, 3) of whole runs from rest."""
+    runs = len(whole.run)
+    return -follow(vector[None], np.zeros((1, 5, runs)), whole)[0].reshape(runs, ROWS, 3)
 
 
 def likeliest_end(windows, nominal, without=()) -> Found:

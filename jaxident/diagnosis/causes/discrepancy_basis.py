@@ -24,7 +24,7 @@ MEMORIES = (2.0, 8.0)
 """Time constants [s] of what forgets slowly."""
 MOST_TERMS = 6
 WORTH = 9.0
-"""Fall of -log p that a term must bring: one of a hundred does so by chance once in 450 times (chi-squared at 18)."""
+"""Fall of -log p that a term must bring: one of 157 does so by chance once in 290 times (chi-squared at 18)."""
 
 
 class Term(NamedTuple):

@@ -41,8 +41,9 @@ SURE = 2.0
 """Log evidence from which an effect is named in the end: seven times as likely as not. No other value was tried."""
 SENT, TERMS = 13.0, 2.0
 """Log-likelihood for which lost commands are believed, and how many times what the largest term in no catalogue brings
-they must bring: where something is missing that has no name, as much is made up easily. The first losses must be by
-chance, too; what is found later is what these have left, and is seen best of small changes."""
+they must bring: where something is missing that has no name, as much is made up easily. Only the first ones
+found must go by chance: those found after them went by the size of the change where commands were lost, too
+(dependence up to 168)."""
 
 
 class Found(NamedTuple):
@@ -134,8 +135,9 @@ def climb(
         if more is None or more.gain < max(SENT, TERMS * rest.largest) or (lost is None and not more.by_chance):
             bare = fit_without_effects(state.data, nominal, now.fit, bool(rest.terms))
             return defended(Found(state, law, likely, rest, lost, bare))
-        share, gain = (0.0, 0.0) if lost is None else (lost.share, lost.gain)
-        lost = more._replace(share=share + more.share, gain=gain + more.gain)
+        earlier = more._replace(share=0.0, gain=0.0) if lost is None else lost
+        share, gain = earlier.share + more.share, earlier.gain + more.gain
+        lost = more._replace(share=share, gain=gain, dependence=earlier.dependence)
         windows, repairs, laws = windows._replace(command=more.arrived), repairs + 1, min(laws, MOST_LAWS - 1)
 
 

@@ -31,7 +31,7 @@ MOST_ODDS = 50.0
 
 class Lost(NamedTuple):
     """The likeliest share of lost commands, the fall of -log p that it brings, commands (rows of a run, runs, 2) as
-    they arrived, and how far the losses depend on the motion (`_dependence`)."""
+    they arrived, and how far the losses that were found first depend on the motion (`_dependence`)."""
 
     share: float
     gain: float
