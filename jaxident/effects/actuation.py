@@ -30,10 +30,15 @@ from jaxident.effects.effect import (
     signed,
 )
 from jaxident.effects.gears import lag, lag_of_runs, play, play_of_runs
+from jaxident.effects.law_kinds import CHANGES, WHEELS
 from jaxident.effects.signals import Zone
 
 OFF = 1e3
 """A saturation level far above every command, in largest commands."""
+_LATE = tuple(
+    (WHEELS, *law) for own in CHANGES for law in (("1", own), (own, "v"), (own, "w"), (own, "own speed"))
+)  # fmt: skip
+"""Discovered laws of a robot that follows its commands late."""
 
 
 def asymmetric_dead_zone(zone: Zone, _: Array, right: Array, left: Array) -> Zone:
@@ -127,6 +132,7 @@ RECORDS = (
         name="input_rate_limit", site="actuation", stage="slew", step=statements.RATE_LIMIT,
         words="commands can change only so fast",
         equation="|u'| <= R",
+        kinds=_LATE,
         source="slew limit of motor drivers; Franklin, Powell, Emami-Naeini, ch. 9",
         parameters=(Parameter("rate", f"{UNIT}/s", float("inf"), (1.0, 50.0), 5.0, least=0.0, above=True),),
         channels=BOTH,
@@ -141,6 +147,7 @@ RECORDS = (
         name="transport_delay", site="actuation", stage="arrival", step=statements.DELAY, quantity="delay",
         words="commands act late, or the camera reports late",
         equation="u(t) -> u(t - T)",
+        kinds=_LATE,
         source="radio, computing and camera latency; Astrom, Murray, Feedback Systems, ch. 10",
         parameters=(Parameter("delay", "s", 0.0, (0.0, 0.3), 0.05, least=0.0),),
         channels=BOTH,
@@ -151,6 +158,7 @@ RECORDS = (
         name="motor_lag", site="actuation", stage="gear", step=statements.LAG, quantity="lag",
         words="the motors take time to follow",
         equation="q' = (m - q) / tau, gain q in place of gain m",
+        kinds=_LATE,
         source="inductance and speed loop; Franklin, Powell, Emami-Naeini, ch. 2",
         parameters=(Parameter("time_constant", "s", 0.0, (0.0, 0.3), 0.06, least=0.0),),
         channels=BOTH,

@@ -4,13 +4,14 @@ of the chain.
     what it adds = times * curve(signal), or times * surface(signal, second signal)
 
 A curve is straight between its knots and constant beyond them; so is a surface along each of its signals. times is 1,
-the speed v, the turn rate w, a wheel's push, or the cosine or sine of the heading. A robot that loses speed in turns
+the speed v, the turn rate w, the cosine or sine of the heading, or of each wheel its push or how far its command has
+just changed. A robot that loses speed in turns
 has v times a curve of w; one that is slow on a patch of carpet has v times a surface of x and y; a floor that slopes
 differently from place to place makes two surfaces, one for each direction. Both integrators take laws from their
 settings (`with_laws`), under one name that no effect of the catalogue has.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -23,7 +24,6 @@ from jaxident.effects.law_kinds import (
     BY_CAMERA,
     DISCOVERED,
     HEADING,
-    HEATS,
     MOST_KNOTS,
     MOST_LAWS,
     MOST_SURFACE_KNOTS,
@@ -31,6 +31,7 @@ from jaxident.effects.law_kinds import (
     SIGNALS,
     TIMES,
     WHEELS,
+    remembered,
     scaled,
 )
 from jaxident.effects.signals import Motion
@@ -105,19 +106,18 @@ def pushed(settings: Mapping[str, Any], drive: Physical, now: Motion, here: Here
     if DISCOVERED not in settings:
         return None
     laws: Laws = settings[DISCOVERED]["laws"]
-    wheels = force(drive, _pushed_wheels(laws, wheel_speeds(drive, now.v, now.w), here))
-    whole = _added(laws, _shared(now, here)) * _factor(laws, now)
+    wheels = force(drive, _pushed_wheels(laws, wheel_speeds(drive, now.v, now.w), now, here))
+    whole = _added(laws, _shared(now, here))
     return Force(_sum(laws, ALONG, whole) + wheels.along, _sum(laws, HEADING, whole) + wheels.heading)
 
 
-def _pushed_wheels(laws: Laws, speeds: Wheels, here: Here) -> Wheels:
+def _pushed_wheels(laws: Laws, speeds: Wheels, now: Motion, here: Here) -> Wheels:
     """What laws add to the push of each wheel; none of them is a surface."""
-    whole = []
+    shared, past, whole = _shared(now, here), remembered(here.past), []
     for number, (n, m) in enumerate(zip(speeds, here.push, strict=True)):
-        own = {"own speed": n, "own push": m, **dict(zip(HEATS, here.past.heat[:, number], strict=True))}
-        curve = _curve(laws, _chosen(laws.signal, own))
-        by_push = _each(laws.times == list(TIMES).index("own push"), n)
-        whole.append(_sum(laws, WHEELS, jnp.where(by_push, m, 1.0) * curve))
+        known = shared | {"own speed": n, "own push": m} | {name: part[number] for name, part in past.items()}
+        curve = _curve(laws, _chosen(laws.signal, SIGNALS, known))
+        whole.append(_sum(laws, WHEELS, curve * _chosen(laws.times, TIMES, known)))
     return Wheels(*whole)
 
 
@@ -126,7 +126,7 @@ def sideways(settings: Mapping[str, Any], now: Motion, here: Here) -> Array:
     if DISCOVERED not in settings:
         return 0.0
     laws: Laws = settings[DISCOVERED]["laws"]
-    return _sum(laws, SIDEWAYS, _added(laws, _shared(now, here)) * _factor(laws, now))
+    return _sum(laws, SIDEWAYS, _added(laws, _shared(now, here)))
 
 
 def shifted(settings: Mapping[str, Any], pose: Pose, true: Pose) -> Pose:
@@ -135,38 +135,40 @@ def shifted(settings: Mapping[str, Any], pose: Pose, true: Pose) -> Pose:
         return pose
     laws: Laws = settings[DISCOVERED]["laws"]
     sine, cosine = sin_cos(true.theta)
-    error = _added(laws, {"heading": wrap(true.theta), "x": true.x, "y": true.y})
+    error = _added(laws, {"1": jnp.ones_like(true.x), "heading": wrap(true.theta), "x": true.x, "y": true.y})
     ahead, left, turn = (_sum(laws, act, error) for act in BY_CAMERA)
     return Pose(pose.x + ahead * cosine - left * sine, pose.y + ahead * sine + left * cosine, pose.theta + turn)
 
 
 def _shared(now: Motion, here: Here) -> dict[str, Array]:
-    """Signals that are the same for both wheels, by name."""
+    """Signals and factors that are the same for both wheels, by name."""
     right, left = here.push
-    return {"v": now.v, "w": now.w, "heading": wrap(now.theta), "x": here.x, "y": here.y, "time": here.time,
+    sine, cosine = sin_cos(now.theta)
+    return {"1": jnp.ones_like(now.v), "v": now.v, "w": now.w, "cos heading": cosine, "sin heading": sine,
+            "heading": wrap(now.theta), "x": here.x, "y": here.y, "time": here.time,
             "push right": right, "push left": left, "since reversal": here.past.since}  # fmt: skip
 
 
 def _added(laws: Laws, known: Mapping[str, Array]) -> Array:
-    """curve(signal) or surface(signal, second signal) of every law (laws, ...); of laws of other signals than the known
-    ones something that is not to be read."""
-    second_knots = jnp.shape(laws.value)[2]
+    """times * curve(signal) or surface(signal, second signal) of every law (laws, ...); of laws of other signals than
+    the known ones something that is not to be read."""
+    times, second_knots = _chosen(laws.times, TIMES, known), jnp.shape(laws.value)[2]
     if second_knots == 1:
-        return _curve(laws, _chosen(laws.signal, known))
-    first, along = _piece(laws.at, _chosen(laws.signal, known))
-    second, across = _piece(laws.second_at, _chosen(laws.second, known))
+        return times * _curve(laws, _chosen(laws.signal, SIGNALS, known))
+    first, along = _piece(laws.at, _chosen(laws.signal, SIGNALS, known))
+    second, across = _piece(laws.second_at, _chosen(laws.second, SIGNALS, known))
     corner = first * second_knots + second
     here, ahead = (
         _between(_entries(laws.value, place), _entries(laws.value, place + 1), across)
         for place in (corner, corner + second_knots)
     )
-    return _between(here, ahead, along)
+    return times * _between(here, ahead, along)
 
 
-def _chosen(signal: Array, known: Mapping[str, Array]) -> Array:
-    """The signals (laws, ...) at some places in SIGNALS (laws,), 0 where they are not known."""
+def _chosen(places: Array, names: Collection[str], known: Mapping[str, Array]) -> Array:
+    """What is known (laws, ...) by the names at some places (laws,), 0 where nothing is."""
     shape = jnp.broadcast_shapes(*(jnp.shape(value) for value in known.values()))
-    return jnp.stack([jnp.broadcast_to(known.get(name, 0.0), shape) for name in SIGNALS])[signal]
+    return jnp.stack([jnp.broadcast_to(known.get(name, 0.0), shape) for name in names])[places]
 
 
 def _curve(laws: Laws, signal: Array) -> Array:
@@ -198,13 +200,6 @@ def _entries(table: Array, places: Array) -> Array:
 
 def _between(low: Array, high: Array, part: Array) -> Array:
     return low + part * (high - low)
-
-
-def _factor(laws: Laws, now: Motion) -> Array:
-    """What the curve of every law is multiplied with (laws, ...); 1 for those of a wheel's own push."""
-    sine, cosine = sin_cos(now.theta)
-    one = jnp.ones_like(now.v)
-    return jnp.stack([one, now.v, now.w, one, cosine, sine])[laws.times]
 
 
 def _each(values: Array, like: Array) -> Array:

@@ -2,16 +2,20 @@
 
 import dataclasses
 from collections.abc import Sequence
+from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 
 from jaxident.effects.effect import UNIT
-from jaxident.effects.past import HEAT_TIMES
+from jaxident.effects.past import CHANGE_TIMES, HEAT_TIMES, Past
 from jaxident.errors import InputError
 from jaxident.robot.model import Discovered
 
 SQUARE = f"{UNIT}^2"
 HEATS = {f"own heat {tau:g} s": tau for tau in HEAT_TIMES}
+CHANGES = {f"own change {tau:g} s": tau for tau in CHANGE_TIMES}
+MEMORIES = HEATS | CHANGES
 """Signals that remember the wheel's own command, and the time constant [s] of each."""
 DISCOVERED = "discovered"
 """The key of laws among the settings of a program."""
@@ -28,13 +32,15 @@ BY_CAMERA = (AHEAD, LEFT, TURN)
 SIGNALS = {
     "v": "m/s", "w": "rad/s", "heading": "rad", "x": "m", "y": "m", "time": "s", "push right": UNIT,
     "push left": UNIT, "since reversal": "s", "own speed": UNIT, "own push": UNIT, **dict.fromkeys(HEATS, SQUARE),
+    **dict.fromkeys(CHANGES, UNIT),
 }  # fmt: skip
 """What a curve may depend on, and the unit. time: session time. since reversal: since the commands' sum last changed
 its sign (`past`). own: of the wheel that is pushed; its speed is in the commands that hold it, its heat a mean of its
-squared command over some seconds."""
+squared command over some seconds, its change the command less the mean over them."""
 OF_CAMERA = ("heading", "x", "y")
 """Signals that a camera's error may depend on."""
-TIMES = {"1": "", "v": "m/s", "w": "rad/s", "own push": UNIT, "cos heading": "", "sin heading": ""}
+TIMES = {"1": "", "v": "m/s", "w": "rad/s", "cos heading": "", "sin heading": "", "own push": UNIT,
+         **dict.fromkeys(CHANGES, UNIT)}  # fmt: skip
 """What a curve may be multiplied with, and the unit."""
 
 
@@ -42,6 +48,11 @@ def value_name(law: int, knot: int) -> str:
     """What a model's covariance calls the value of a law at one of its knots, both counted from 0; knots of a surface
     row by row."""
     return f"{DISCOVERED}.{law + 1}.{knot + 1}"
+
+
+def remembered(past: Past, axis: int = 0) -> dict[str, Any]:
+    """What the commands of each wheel left behind, by signal. axis: of heat and change, that of the time constants."""
+    return dict(zip(MEMORIES, (row for part in past[1:] for row in jnp.moveaxis(part, axis, 0)), strict=True))
 
 
 def knots_by_signal(law: Discovered) -> dict[str, np.ndarray]:
@@ -77,13 +88,11 @@ def _check_kind(law: Discovered) -> None:
         if value not in known:
             raise InputError(f"discovered: {key} is {value!r}; known are {', '.join(known)}")
     signals = {law.signal, law.second_signal} - {""}
-    by_camera, own = law.acts_on in BY_CAMERA, any(signal.startswith("own ") for signal in signals)
+    by_camera, own = law.acts_on in BY_CAMERA, any(name.startswith("own ") for name in (*signals, law.times))
     if by_camera and (not signals <= set(OF_CAMERA) or law.times != "1"):
         raise InputError(f"discovered: an error of the camera is 1 times a curve of {' or '.join(OF_CAMERA)}")
     if own != (law.acts_on == WHEELS) or (own and law.second_signal):
-        raise InputError("discovered: a push of each wheel is a curve of the wheel's own speed, push or heat")
-    if law.times not in (("1", "own push") if own else (name for name in TIMES if name != "own push")):
-        raise InputError(f"discovered: {law.times} times a curve of {law.signal}: no program multiplies these")
+        raise InputError("discovered: a push of each wheel is, or is times, a curve of what is the wheel's own")
     if law.signal == law.second_signal:
         raise InputError(f"discovered: a surface of {law.signal} and {law.signal}; two signals are needed")
 

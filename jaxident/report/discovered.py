@@ -10,7 +10,7 @@ from jaxident.diagnosis.diagnose import Diagnosis
 from jaxident.diagnosis.discovery.forms import PATCH, beyond
 from jaxident.diagnosis.discovery.kinds import Kind
 from jaxident.effects.catalogue import BY_KIND
-from jaxident.effects.law_kinds import HEATS, SIGNALS, value_unit
+from jaxident.effects.law_kinds import CHANGES, HEATS, SIGNALS, value_unit
 from jaxident.report.page import Figure, Section, Table
 from jaxident.report.words import number, percent, plain, together
 
@@ -19,10 +19,12 @@ SIGNAL_WORDS = {
     "time": "session time", "push right": "push of the right wheel", "push left": "push of the left wheel",
     "own speed": "speed of that wheel", "own push": "push of that wheel", "since reversal": "time since a reversal",
     **{name: f"mean square of that wheel's command over {tau:g} s" for name, tau in HEATS.items()},
+    **{name: f"change of that wheel's command over {tau:g} s" for name, tau in CHANGES.items()},
 }  # fmt: skip
 TIMES_WORDS = {
     "1": "", "v": "speed times ", "w": "turn rate times ", "own push": "push of that wheel times ",
     "cos heading": "the heading's cosine times ", "sin heading": "the heading's sine times ",
+    **{name: f"change of that wheel's command over {tau:g} s times " for name, tau in CHANGES.items()},
 }  # fmt: skip
 SEEN = (
     "These laws are in no catalogue. They were found on the runs that fit, and runs that took no part in that confirm "

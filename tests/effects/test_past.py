@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from jaxident.effects.past import HEAT_TIMES, LONGEST, past_of, past_of_run
+from jaxident.effects.past import CHANGE_TIMES, HEAT_TIMES, LONGEST, past_of, past_of_run
 
 
 def drive(rows: int):
@@ -54,6 +54,27 @@ def test_heat_follows_its_equation(number):
     np.testing.assert_allclose(found, slow_heat(t, command, HEAT_TIMES[number]), atol=1e-4)
 
 
+def slow_change(t, command, tau, parts=400):
+    """By small steps of Euler's method, the mean over each row."""
+    step = np.diff(t, append=2.0 * t[-1] - t[-2])
+    mean, found = np.zeros(2), []
+    for h, u in zip(step, command, strict=True):
+        apart = []
+        for _ in range(parts):
+            after = mean + h / parts * (u - mean) / tau
+            apart.append(u - 0.5 * (mean + after))
+            mean = after
+        found.append(np.mean(apart, axis=0))
+    return np.array(found)
+
+
+@pytest.mark.parametrize("number", range(len(CHANGE_TIMES)))
+def test_changes_follow_their_equation(number):
+    t, command = drive(100)
+    found = np.asarray(past_of(t, command).change)[:, number]
+    np.testing.assert_allclose(found, slow_change(t, command, CHANGE_TIMES[number]), atol=2e-3)
+
+
 @pytest.mark.parametrize("rows", [2, 511, 512, 513, 1400])
 def test_runs_that_are_filled_up_have_the_same_past(rows):
     t, command = drive(rows)
@@ -62,6 +83,7 @@ def test_runs_that_are_filled_up_have_the_same_past(rows):
     # the last row's step is not known; the plain one guesses it
     np.testing.assert_allclose(whole.since[:-1], plain.since[:-1], atol=1e-12)
     np.testing.assert_allclose(whole.heat[:-1], plain.heat[:-1], atol=1e-12)
+    np.testing.assert_allclose(whole.change[:-1], plain.change[:-1], atol=1e-12)
 
 
 def test_runs_side_by_side_are_those_alone():
@@ -71,3 +93,4 @@ def test_runs_side_by_side_are_those_alone():
         alone = past_of(t, command)
         np.testing.assert_allclose(both.since[:, k], alone.since)
         np.testing.assert_allclose(both.heat[..., k], alone.heat)
+        np.testing.assert_allclose(both.change[..., k], alone.change)

@@ -18,7 +18,7 @@ from jaxident.diagnosis.motion.paths import left_behind
 from jaxident.diagnosis.motion.responses import Responses
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.discovered import Laws
-from jaxident.effects.law_kinds import AHEAD, ALONG, BY_CAMERA, HEADING, HEATS, LEFT, SIDEWAYS, TURN, WHEELS
+from jaxident.effects.law_kinds import AHEAD, ALONG, BY_CAMERA, HEADING, LEFT, SIDEWAYS, TURN, WHEELS, remembered
 
 _left_behind = jax.jit(left_behind)
 KNOTS = 10
@@ -33,7 +33,7 @@ VARIED = 1e-6
 
 
 class Path(NamedTuple):
-    """Signals (windows, rows) along the path of a fit, and by wheel those of its own (windows, rows, 2); gain (2, 2) of
+    """Signals (windows, rows) along the path of a fit, and those of each wheel's own (windows, rows, 2); gain (2, 2) of
     the nominal drive; seen (windows, numbers)."""
 
     signals: dict[str, Any]
@@ -67,7 +67,7 @@ def path_of(fit: Solution, windows: Windows, laws: Laws | None = None) -> Path:
                "since reversal": np.asarray(past.since).T, "cos heading": np.cos(theta),
                "sin heading": np.sin(theta)}  # fmt: skip
     own = {"1": np.ones_like(push), "own speed": speeds, "own push": push}
-    own |= dict(zip(HEATS, np.asarray(past.heat).transpose(1, 3, 0, 2), strict=True))
+    own |= {name: np.asarray(part).transpose(2, 0, 1) for name, part in remembered(past, axis=1).items()}
     seen = np.repeat(np.asarray(windows.seen).T, 3, axis=1)
     return Path(signals, own, gain, seen)
 
@@ -86,7 +86,8 @@ def candidates(path: Path, responses: Responses) -> Iterator[Candidate]:
 def _signals(kind: Kind, path: Path) -> list[np.ndarray]:
     """What a law depends on, one or two."""
     if kind.acts_on == WHEELS:
-        return [path.own[kind.signal]]
+        own = path.own.get(kind.signal)
+        return [np.stack([path.signals[kind.signal]] * 2, axis=-1) if own is None else own]
     return [path.signals[name] for name in (kind.signal, kind.second_signal) if name]
 
 

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from jaxident.effects.law_kinds import AHEAD, ALONG, BY_CAMERA, HEADING, HEATS, LEFT, SIDEWAYS, TURN, WHEELS
+from jaxident.effects.law_kinds import AHEAD, ALONG, BY_CAMERA, CHANGES, HEADING, HEATS, LEFT, SIDEWAYS, TURN, WHEELS
 
 OF_FORCE = ("v", "w", "heading", "x", "y", "time", "push right", "push left", "since reversal")
 ELSEWHERE = ("heading", "x", "y", "time", "since reversal")
@@ -12,9 +12,9 @@ ELSEWHERE = ("heading", "x", "y", "time", "since reversal")
 SITE_OF_SIGNAL = {
     "v": "drive", "w": "drive", "heading": "contact", "x": "contact", "y": "contact", "time": "time",
     "push right": "actuation", "push left": "actuation", "since reversal": "contact", "own speed": "drive",
-    "own push": "actuation", **dict.fromkeys(HEATS, "actuation"),
+    "own push": "actuation", **dict.fromkeys([*HEATS, *CHANGES], "actuation"),
 }  # fmt: skip
-"""The site of a law that acts on accelerations or pushes, by its signal."""
+"""The site of a law that acts on accelerations or pushes, by its signal, or by what of the commands it multiplies."""
 NOMINAL = ("v", "w", "push right", "push left", "own speed", "own push")
 """Signals on which a force of the nominal robot depends, in a straight line."""
 FLOOR = ((ALONG, "1"), (ALONG, "v"), (ALONG, "cos heading"), (ALONG, "sin heading"), (HEADING, "1"), (HEADING, "w"),
@@ -41,7 +41,9 @@ class Kind(NamedTuple):
         """The site of the catalogue that such a law belongs to."""
         if self.acts_on in BY_CAMERA:
             return "camera"
-        return "contact" if self.acts_on == SIDEWAYS else SITE_OF_SIGNAL[self.signal]
+        if self.acts_on == SIDEWAYS:
+            return "contact"
+        return SITE_OF_SIGNAL[self.times if self.times in CHANGES else self.signal]
 
 
 KINDS = (
@@ -52,6 +54,8 @@ KINDS = (
     *(Kind(SIDEWAYS, "1", signal) for signal in ("w", "heading")),
     *(Kind(WHEELS, "1", signal) for signal in ("own speed", "own push")),
     *(Kind(WHEELS, "own push", signal) for signal in HEATS),
+    *(Kind(WHEELS, change, signal) for change in CHANGES for signal in ("v", "w", "own speed")),
+    *(Kind(WHEELS, "1", change) for change in CHANGES),
     *(Kind(act, "1", signal) for act in (AHEAD, LEFT, TURN) for signal in ("heading", "x", "y")),
     *(Kind(act, times, "x", "y") for act, times in FLOOR),
     *(Kind(act, "1", *pair) for act in (ALONG, HEADING) for pair in (("v", "w"), ("push right", "push left"))),

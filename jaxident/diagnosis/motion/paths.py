@@ -56,8 +56,9 @@ def rolled(vector: Array, starts: Array, push: Push, windows: Windows, laws: Law
 def left_behind(windows: Windows) -> Past:
     """What the commands left behind at each row of the windows (rows, ..., windows)."""
     places = jnp.minimum(windows.first + jnp.arange(len(windows.step))[:, None], len(windows.t) - 1)
-    since, heat = past_of(windows.t, windows.command)
-    return Past(since[places, windows.run], jnp.moveaxis(heat, -1, 1)[places, windows.run].transpose(0, 2, 3, 1))
+    since, *by_wheel = past_of(windows.t, windows.command)
+    own = (jnp.moveaxis(part, -1, 1)[places, windows.run].transpose(0, 2, 3, 1) for part in by_wheel)
+    return Past(since[places, windows.run], *own)
 
 
 def _moved(vector: Array, starts: Array, push: Push, windows: Windows, laws: Laws | None) -> tuple[State, list]:

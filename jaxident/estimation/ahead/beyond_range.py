@@ -3,7 +3,7 @@
 import numpy as np
 
 from jaxident.array_types import Array, Wheels
-from jaxident.effects.law_kinds import HEATS, SIGNALS, knots_by_signal
+from jaxident.effects.law_kinds import SIGNALS, knots_by_signal, remembered
 from jaxident.estimation.ahead.stretches import Starts, cut_stretches
 from jaxident.log import Log
 from jaxident.numerics import wrap
@@ -54,11 +54,11 @@ def signals(model: Model, log: Log, starts: Starts, pose: Array, session_time: f
     w = turned / np.diff(t, axis=0)
     command = np.where(np.isfinite(x), np.moveaxis(stretch.command[1:], -1, 0), np.nan)
     push = [np.asarray(wheel) for wheel in effective_command(Wheels(*command), model.dead_zone)]
-    heat = np.concatenate([stretch.heat[1:, :, number].swapaxes(0, 1) + 0.0 * x for number in (0, 1)], axis=1)
+    past = {name: np.asarray(part[1:]).swapaxes(0, 1) for name, part in remembered(stretch.past, axis=1).items()}
     speeds = [np.asarray(wheel) for wheel in wheel_speeds(drive, v, w)]
     return {
         "v": v, "w": w, "heading": np.asarray(wrap(theta)), "x": x, "y": y,
         "time": stretch.session + t + 0.0 * x, "push right": push[0], "push left": push[1],
-        "since reversal": stretch.since[1:] + 0.0 * x, "own speed": np.concatenate(speeds),
-        "own push": np.concatenate(push), **dict(zip(HEATS, heat, strict=True)),
+        "since reversal": stretch.past.since[1:] + 0.0 * x, "own speed": np.concatenate(speeds),
+        "own push": np.concatenate(push), **{name: np.concatenate(part + 0.0 * x) for name, part in past.items()},
     }  # fmt: skip

@@ -36,8 +36,8 @@ class Stretch(NamedTuple):
     """Rows of a log side by side: t (rows, n) [s] since the first row, session time (n,) [s] there, command (rows, n,
     2), pose (rows, n, 3), seen (rows, n): poses that the filter takes in. first (n,): row of the first of them, from
     which on it filters; speeds (2, n) along and in heading: the guess there, NaN keeps those of the run-up from rest.
-    begin (n,): row at which its run begins, moving as it may, or 0. since (rows, n), heat (rows, times, 2, n): what
-    the commands of the whole run left behind (`effects.past`); no rows where no law asks for it.
+    begin (n,): row at which its run begins, moving as it may, or 0. past: what the commands of the whole run left
+    behind, leaves (rows, ..., n); no rows where no law asks for it.
     """
 
     t: Any
@@ -48,8 +48,7 @@ class Stretch(NamedTuple):
     first: Any
     speeds: Any
     begin: Any
-    since: Any
-    heat: Any
+    past: Past
 
 
 class Run(NamedTuple):
@@ -88,7 +87,7 @@ def filter_and_run(
     part = step / SUBSTEPS
     mean, slope = (leaf.transpose(0, 2, 3, 1) for leaf in push)
     jolt = None if jolt is None else jnp.stack(force(drive, Wheels(*jnp.moveaxis(jolt, 2, 0))), axis=1)
-    past = None if laws is None else Past(stretch.since, stretch.heat)
+    past = None if laws is None else stretch.past
     rows = Row(mean, slope, part, lags_of(drive, part), stretch.session + t, past)
     number = jnp.arange(len(t))
     size = 5 + 2 * (noise.slip_time is not None) + 3 * (noise.correlation_time is not None)

@@ -12,6 +12,7 @@ from jaxident.effects.catalogue import BY_CHANCE
 from jaxident.effects.coordinates import vector_of
 from jaxident.effects.discovered import Laws, laws_of
 from jaxident.effects.fast_input import RUN_UP
+from jaxident.effects.past import Past
 from jaxident.estimation.ahead.camera_noise import noise_for
 from jaxident.estimation.ahead.filtered_state import Run, Stretch, filter_and_run
 from jaxident.estimation.ahead.parameter_spread import directions
@@ -114,7 +115,7 @@ def _filtered(
     return Run(*(np.where(lost, new, old) for new, old in zip(again, found, strict=True))), other, lost
 
 
-_run_block = kept_program(Laws, Noise, Stretch, Run)(filter_and_run)
+_run_block = kept_program(Laws, Noise, Stretch, Past, Run)(filter_and_run)
 
 
 def _in_blocks(vector: Array, laws: Laws | None, noise: Noise, lost: float | None, stretch: Stretch, first: int) -> Run:
@@ -124,9 +125,7 @@ def _in_blocks(vector: Array, laws: Laws | None, noise: Noise, lost: float | Non
     count, blocks = stretch.t.shape[1], []
     for begin in range(0, count, LANES):
         chosen = np.minimum(np.arange(begin, begin + LANES), count - 1)
-        block = Stretch(*(
-            np.take(leaf, chosen, axis=axis) for leaf, axis in zip(stretch, AXES, strict=True)
-        ))  # fmt: skip
+        block = jax.tree.map(lambda axis, leaf, chosen=chosen: np.take(leaf, chosen, axis), AXES, stretch)
         blocks.append((vector, laws, noise, lost, block, first))
     parts = [jax.tree.map(np.asarray, block) for block in in_parallel(_run_block, blocks, ahead=False)]
     return Run(*(np.concatenate(leaves, axis=-1)[..., :count] for leaves in zip(*parts, strict=True)))

@@ -2,10 +2,11 @@
 
 from typing import NamedTuple
 
+import jax
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.effects.past import NO_PAST, past_of_run
+from jaxident.effects.past import NO_PAST, Past, past_of_run
 from jaxident.errors import InputError
 from jaxident.estimation.ahead.filtered_state import Stretch
 from jaxident.log import Log, join
@@ -16,7 +17,7 @@ FEWEST = 3
 """Poses below which speeds are not guessed: those of the run-up stay."""
 
 
-AXES = (1, 0, 1, 1, 1, 0, 1, 0, 1, 3)
+AXES = Stretch(1, 0, 1, 1, 1, 0, 1, 0, Past(1, 3, 3))
 """The axis of each part of a `Stretch` along which stretches lie side by side."""
 
 
@@ -56,8 +57,7 @@ def cut_stretches(
         _of_run(runs[k], starts.row[starts.run == k], lead, before, horizon, passed[k], past)
         for k in np.unique(starts.run)
     ]
-    columns = zip(zip(*parts, strict=True), AXES, strict=True)
-    return Stretch(*(np.concatenate(column, axis=axis) for column, axis in columns))
+    return jax.tree.map(lambda axis, *own: np.concatenate(own, axis), AXES, *parts)
 
 
 def _of_run(run: Log, starts: Array, lead: int, before: int, horizon: int, session: float, past: bool) -> Stretch:
@@ -72,10 +72,11 @@ def _of_run(run: Log, starts: Array, lead: int, before: int, horizon: int, sessi
     seen = np.isfinite(pose).all(axis=-1) & (rows >= 0) & (rows <= starts) & (rows >= starts - before)
     pose = np.where(seen[..., None], pose, 0.0)
     begin = np.maximum(lead + before - starts, 0)
-    since, heat = past_of_run(np.asarray(run.t), sent) if past else NO_PAST
+    since, *by_wheel = past_of_run(np.asarray(run.t), sent) if past else NO_PAST
     kept = inside if past else inside[:0]
+    left = Past(since[kept], *(np.moveaxis(part[kept], 1, -1) for part in by_wheel))
     found = Stretch(t - t[0], session + t[0] - run.t[0], command, pose, seen, np.argmax(seen, axis=0), None, begin,
-                    since[kept], np.moveaxis(heat[kept], 1, -1))  # fmt: skip
+                    left)  # fmt: skip
     return found._replace(speeds=_guess(found))
 
 

@@ -230,5 +230,5 @@ def test_the_nominal_part_of_a_law_is_what_the_linear_robot_has(kind):
     at = (FLOOR, FLOOR) if kind.second_signal else (AT,)
     forces = kind.acts_on.startswith(("acceleration", "push"))
     linear = sum(name in ("v", "w", "push right", "push left", "own speed", "own push") for name in kind.names[2:])
-    columns = {"1": linear, "cos heading": 0, "sin heading": 0}.get(kind.times, 1) if forces else 0
+    columns = {"1": linear, "v": 1, "w": 1, "own push": 1}.get(kind.times, 0) if forces else 0
     assert nominal_part(kind, at).shape == (int(np.prod([len(each) for each in at])), columns)
