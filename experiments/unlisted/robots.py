@@ -22,7 +22,8 @@ SLIP = (0.003, 0.015)
 
 class Now(NamedTuple):
     """State and input of all runs (runs,): pose, speeds, net pushes of both wheels, travelled angle of both [rad], heat
-    of both motors, time since v last changed its sign [s], session time [s]."""
+    of both motors, time since v last changed its sign [s], session time [s]; net pushes by the commands before, and
+    the time [s] since they changed; speed of both rims [m/s]."""
 
     x: np.ndarray
     y: np.ndarray
@@ -34,6 +35,9 @@ class Now(NamedTuple):
     heat: np.ndarray
     since: np.ndarray
     time: np.ndarray
+    older: np.ndarray
+    age: np.ndarray
+    rim: np.ndarray
 
 
 Added = tuple[np.ndarray | float, np.ndarray | float]
@@ -103,6 +107,16 @@ def _oval(push: np.ndarray, now: Now, size: float) -> np.ndarray:
     return push * np.stack([1.0 + 0.4 * size * np.sin(now.angle[0]), np.ones_like(now.v)])
 
 
+def _late(push: np.ndarray, now: Now, size: float) -> np.ndarray:
+    """A busy link: commands arrive the later, the faster the robot is."""
+    return np.where(now.age < 0.2 * size * np.abs(now.v), now.older, push)
+
+
+def _brakes(push: np.ndarray, now: Now, size: float) -> np.ndarray:
+    """A driver that lets its motors run out: a push against the wheel's speed is weaker."""
+    return push * (1.0 - 0.5 * size * np.clip(-np.sign(push) * now.rim / 0.03, 0.0, 1.0))
+
+
 def _same(push: np.ndarray, now: Now, size: float) -> np.ndarray:
     return push
 
@@ -111,7 +125,8 @@ FORCES: dict[str, Callable[[Now, float, np.random.Generator], Added]] = {
     "patch": _patch, "swirl": _swirl, "saddle": _saddle, "turning": _turning, "friction": _friction,
     "coupled": _coupled, "castor": _castor, "bumps": _bumps,
 }  # fmt: skip
-INPUTS: dict[str, Callable[[np.ndarray, Now, float], np.ndarray]] = {"hot": _hot, "cogs": _cogs, "oval": _oval}
+INPUTS: dict[str, Callable[[np.ndarray, Now, float], np.ndarray]] = {"hot": _hot, "cogs": _cogs, "oval": _oval,
+                                                                        "late": _late, "brakes": _brakes}  # fmt: skip
 KINDS = {**{name: law.__doc__ for name, law in (FORCES | INPUTS).items()}, "nothing": "The nominal robot."}
 """What may be hidden in a robot, in words."""
 
@@ -150,13 +165,15 @@ def drive(robot: Robot, kind: str, size: float, runs: int, seed: int, first: flo
     force, change = FORCES.get(kind, _none), INPUTS.get(kind, _same)
     pose, still = rng.uniform(-1.0, 1.0, (3, runs)) * np.array([[ROOM], [ROOM], [np.pi]]), np.zeros(runs)
     now = Now(*pose, still, still, np.zeros((2, runs)), rng.uniform(0, 6, (2, runs)), np.zeros((2, runs)), still + 9.0,
-              first + STEP * ROWS * np.arange(runs))  # fmt: skip
+              first + STEP * ROWS * np.arange(runs), np.zeros((2, runs)), still + 9.0,
+              np.zeros((2, runs)))  # fmt: skip
     goal, command, left = rng.uniform(-ROOM, ROOM, (2, runs)), np.zeros((2, runs)), np.zeros(runs)
     h, rows = STEP / SUBSTEPS, []
     for row in range(ROWS):
         near, fresh = np.hypot(now.x - goal[0], now.y - goal[1]) < 0.3, left <= 0
         goal = np.where(near, rng.uniform(-ROOM, ROOM, (2, runs)), goal)
-        command = np.where(fresh, steer(now, goal, robot, rng), command)
+        older, age = np.where(fresh, now.push, now.older), np.where(fresh, 0.0, now.age)
+        now, command = now._replace(older=older, age=age), np.where(fresh, steer(now, goal, robot, rng), command)
         left = np.where(fresh, rng.integers(6, 25, runs), left) - 1
         rows.append([np.full(runs, row * STEP), *command, now.x, now.y, now.theta])
         jolt = rng.normal(size=(2, runs)) * np.array(SLIP)[:, None] / np.sqrt(STEP)
@@ -189,4 +206,5 @@ def _step(robot: Robot, now: Now, command: np.ndarray, jolt: np.ndarray, effect,
     rolled = np.stack([middle.v + 0.5 * robot.track * middle.w, middle.v - 0.5 * robot.track * middle.w]) / robot.radius
     since = np.where(v * now.v < 0.0, 0.0, now.since + h)
     heat = now.heat + h / HEAT_TIME * (push**2 - now.heat)
-    return Now(x, y, theta, v, w, push, now.angle + h * rolled, heat, since, now.time + h)
+    return Now(x, y, theta, v, w, push, now.angle + h * rolled, heat, since, now.time + h, now.older, now.age + h,
+               robot.radius * rolled)  # fmt: skip

@@ -112,12 +112,11 @@ def pushed(settings: Mapping[str, Any], drive: Physical, now: Motion, here: Here
 
 
 def _pushed_wheels(laws: Laws, speeds: Wheels, now: Motion, here: Here) -> Wheels:
-    """What laws add to the push of each wheel; none of them is a surface."""
+    """What laws add to the push of each wheel."""
     shared, past, whole = _shared(now, here), remembered(here.past), []
     for number, (n, m) in enumerate(zip(speeds, here.push, strict=True)):
         known = shared | {"own speed": n, "own push": m} | {name: part[number] for name, part in past.items()}
-        curve = _curve(laws, _chosen(laws.signal, SIGNALS, known))
-        whole.append(_sum(laws, WHEELS, curve * _chosen(laws.times, TIMES, known)))
+        whole.append(_sum(laws, WHEELS, _added(laws, known)))
     return Wheels(*whole)
 
 

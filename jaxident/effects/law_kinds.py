@@ -91,7 +91,7 @@ def _check_kind(law: Discovered) -> None:
     by_camera, own = law.acts_on in BY_CAMERA, any(name.startswith("own ") for name in (*signals, law.times))
     if by_camera and (not signals <= set(OF_CAMERA) or law.times != "1"):
         raise InputError(f"discovered: an error of the camera is 1 times a curve of {' or '.join(OF_CAMERA)}")
-    if own != (law.acts_on == WHEELS) or (own and law.second_signal):
+    if own != (law.acts_on == WHEELS):
         raise InputError("discovered: a push of each wheel is, or is times, a curve of what is the wheel's own")
     if law.signal == law.second_signal:
         raise InputError(f"discovered: a surface of {law.signal} and {law.signal}; two signals are needed")

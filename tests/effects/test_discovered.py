@@ -50,6 +50,7 @@ LAWS = (
     ("pose to the left", "1", "heading", TURNS[1:-1], 0.03 * np.sin(TURNS[1:-1])),
     ("reported heading", "1", "y", PUSHES, 0.1 * PUSHES),
     ("push of each wheel", "own push", "own heat 3 s", HEATS, -0.5 * HEATS),
+    ("push of each wheel", "1", "own speed", PUSHES[::2], 0.2 * SURFACE, None, "own push", PUSHES[::2]),
     ("push of each wheel", "own change 0.1 s", "v", PUSHES, -2.0 * np.abs(PUSHES)),
     ("push of each wheel", "1", "own change 0.3 s", 2.0 * PUSHES, -np.abs(PUSHES)),
     ("acceleration along", "v", "since reversal", SINCE, -3.0 * np.exp(-SINCE / 0.4)),

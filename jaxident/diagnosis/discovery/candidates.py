@@ -85,10 +85,11 @@ def candidates(path: Path, responses: Responses) -> Iterator[Candidate]:
 
 def _signals(kind: Kind, path: Path) -> list[np.ndarray]:
     """What a law depends on, one or two."""
+    names = [name for name in (kind.signal, kind.second_signal) if name]
     if kind.acts_on == WHEELS:
-        own = path.own.get(kind.signal)
-        return [np.stack([path.signals[kind.signal]] * 2, axis=-1) if own is None else own]
-    return [path.signals[name] for name in (kind.signal, kind.second_signal) if name]
+        both = {name: np.stack([signal] * 2, axis=-1) for name, signal in path.signals.items() if name in names}
+        return [(path.own | both)[name] for name in names]
+    return [path.signals[name] for name in names]
 
 
 def _nearest(signals: list[np.ndarray], at: tuple[Any, ...]) -> np.ndarray:
@@ -103,12 +104,12 @@ def columns_of(kind: Kind, at: tuple[Any, ...], path: Path, responses: Responses
     """Answers of the poses (windows, numbers, knots) to a unit at each knot of a law."""
     signals = _signals(kind, path)
     shape = hats(signals[0], at[0])
+    for signal, knots in zip(signals[1:], at[1:], strict=True):
+        shape = (shape[..., :, None] * hats(signal, knots)[..., None, :]).reshape(*signal.shape, -1)
     if kind.acts_on == WHEELS:
         shape = shape * path.own[kind.times][..., None]
         along, heading = (np.einsum("wrsk,s->wrk", shape, row) for row in path.gain)
         return responses.along @ along + responses.heading @ heading
-    for signal, knots in zip(signals[1:], at[1:], strict=True):
-        shape = (shape[..., :, None] * hats(signal, knots)[..., None, :]).reshape(*signal.shape, -1)
     shape = shape * path.signals[kind.times][..., None]
     if kind.acts_on in BY_CAMERA:
         return _by_camera(kind.acts_on, shape, path)

@@ -56,6 +56,7 @@ KINDS = (
     *(Kind(WHEELS, "own push", signal) for signal in HEATS),
     *(Kind(WHEELS, change, signal) for change in CHANGES for signal in ("v", "w", "own speed")),
     *(Kind(WHEELS, "1", change) for change in CHANGES),
+    Kind(WHEELS, "1", "own speed", "own push"),
     *(Kind(act, "1", signal) for act in (AHEAD, LEFT, TURN) for signal in ("heading", "x", "y")),
     *(Kind(act, times, "x", "y") for act, times in FLOOR),
     *(Kind(act, "1", *pair) for act in (ALONG, HEADING) for pair in (("v", "w"), ("push right", "push left"))),
