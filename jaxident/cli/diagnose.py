@@ -110,7 +110,7 @@ def _told(found) -> list[str]:
     """What the terminal says of a diagnosis."""
     from jaxident.report.account import account_lines
     from jaxident.report.discovered import sentence
-    from jaxident.report.lead import refusal, too_much_noise
+    from jaxident.report.lead import needless, refusal, too_much_noise
     from jaxident.report.motor_or_ground import wheels_line
     from jaxident.report.stretches import left_out
     from jaxident.report.words import plain_text
@@ -119,6 +119,7 @@ def _told(found) -> list[str]:
     lines.append(f"verdict: {SENTENCE[found.verdict].format(effects=' and '.join(found.selected))}")
     lines += [f"discovered: {plain_text(sentence(shown))}" for shown in found.discovered]
     lines += [f"refused: {told}"] if (told := refusal(found)) else []
+    lines += [f"needless: {told}"] if (told := needless(found)) else []
     lines += [plain_text(told)] if (told := too_much_noise(found)) else []
     lines += [table([("cause", "takes part", "site"), *_causes(found)]), _gap(found)]
     lines += wheels_line(found)

@@ -4,13 +4,15 @@ import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 from jaxident.diagnosis.account.account import Account
 from jaxident.diagnosis.account.discovered import Shown
 from jaxident.diagnosis.account.measure import Gap, Measured, measure
 from jaxident.diagnosis.account.models import as_model
 from jaxident.diagnosis.account.odometry import Odometry, odometry
 from jaxident.diagnosis.account.refused import finding_without
-from jaxident.diagnosis.account.shrink import Shrink
+from jaxident.diagnosis.account.shrink import LOW, Shrink, taken
 from jaxident.diagnosis.account.where import Place
 from jaxident.diagnosis.causes.chance_effects import direct_effects, direct_evidence, present
 from jaxident.diagnosis.causes.finding import CLAIMED, Finding, find_effects
@@ -63,6 +65,8 @@ class Diagnosis(NamedTuple):
         suspicions: what the log says against itself, with the option that mends it, a line each.
         refused: effects that fit the runs for naming, and without which the judging runs are predicted better (95 %
             sure). The corrected model has none of them.
+        superseded: effects that were named before the laws were discovered, and for which nothing speaks beside these.
+            The corrected model has none of them, either.
         odometry: the judging stretches as the wheels tell them; None without wheel speeds.
     """
 
@@ -86,6 +90,7 @@ class Diagnosis(NamedTuple):
     discovered: tuple[Shown, ...] = ()
     suspicions: tuple[str, ...] = ()
     refused: tuple[str, ...] = ()
+    superseded: tuple[str, ...] = ()
     odometry: Odometry | None = None
 
     @property
@@ -140,11 +145,11 @@ def diagnose(
     prepared, finding = find_effects(prepare(logs, horizon, None if simulator is None else simulator.vector[:10]))
     if sim is not None:
         simulator, finding = inspect_simulator(sim, prepared, finding)
-    (finding, extra, shown, measured), refused = believed(prepared, finding, simulator, model, seed)
-    gap, account, where, shrinks, corrected, laws, _ = measured
+    (finding, extra, shown, measured), refused, superseded = believed(prepared, finding, simulator, model, seed)
+    gap, account, where, shrinks, corrected, laws, *_ = measured
     told = None if simulator is None else simulator.vector
     common, surplus = shared(shown, simulator)
-    judgement = judge(finding, gap, extra, simulator)
+    judgement = judge(finding, gap, extra, simulator, () if model is not None and model.discovered else laws)
     selected = tuple(name for name in shown if name not in common) if judgement.none < 0.5 else ()
     known = answers(finding.data, finding.nominal, prepared.largest)
     parameters = compare_parameters(prepared, finding, told, common)
@@ -153,7 +158,7 @@ def diagnose(
     return Diagnosis(verdict, judgement, gap, account, where, selected, parameters, visible(known), replay(known, seed),
                      advice(verdict, judgement, laws, prepared.whole), nominal, corrected, shrinks, prepared, finding,
                      surplus, simulator, laws, suspicions_of(join(logs), prepared),
-                     refused, odometry(prepared, gap.paths, corrected))  # fmt: skip
+                     refused, superseded, odometry(prepared, gap.paths, corrected))  # fmt: skip
 
 
 class Seen(NamedTuple):
@@ -168,15 +173,28 @@ class Seen(NamedTuple):
 
 def believed(
     prepared: Prepared, finding: Finding, simulator: Simulator | None, model: Model | None, seed: int
-) -> tuple[Seen, tuple[str, ...]]:
-    """A finding measured on the rows kept for judging, and the effects that these rows refuse: while there are some,
-    it is measured again without them."""
+) -> tuple[Seen, tuple[str, ...], tuple[str, ...]]:
+    """A finding measured on the rows kept for judging, the effects that these rows refuse, and those that discovered
+    laws make needless. While some are refused, it is measured again without them; then without the needless ones,
+    unless these rows are predicted worse then."""
     refused: tuple[str, ...] = ()
     seen = see(prepared, finding, simulator, model, seed)
     while more := seen.measured.refused:
         refused = (*refused, *more)
         seen = see(prepared, finding_without(seen.finding, more), simulator, model, seed)
-    return seen, refused
+    needless = seen.measured.superseded
+    if needless:
+        other = see(prepared, finding_without(seen.finding, needless), simulator, model, seed)
+        if not other.measured.refused and not worse(other.measured.gap, seen.measured.gap, seed):
+            return other, refused, needless
+    return seen, refused, ()
+
+
+def worse(own: Gap, other: Gap, seed: int) -> bool:
+    """Whether the corrected model of one gap misses the judging rows by more than that of another, 95 % surely."""
+    missed, less = (np.sqrt(gap.errors[-1] * gap.unit) for gap in (own, other))
+    share, p_value = taken(missed, less, own.errors[-1], own.unit, seed)
+    return share > 0.0 and p_value < LOW
 
 
 def see(prepared: Prepared, finding: Finding, simulator: Simulator | None, model: Model | None, seed: int) -> Seen:

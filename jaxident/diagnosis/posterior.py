@@ -1,13 +1,16 @@
 """From evidence to probabilities, and from those to a verdict."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from jaxident.diagnosis.account.discovered import Shown
 from jaxident.diagnosis.account.measure import Gap
+from jaxident.diagnosis.account.shrink import RESAMPLES
 from jaxident.diagnosis.causes.finding import CLAIMED, Finding
 from jaxident.diagnosis.simulator import Simulator
-from jaxident.effects.catalogue import CATALOGUE, SITES
+from jaxident.effects.catalogue import BY_KIND, CATALOGUE, SITES
 
 SIGNIFICANT, SHARE = 20.0, 0.05
 """Fall of -log p that terms in no catalogue must bring beyond the best set, and their part of all that is explained,
@@ -69,15 +72,22 @@ class Judgement(NamedTuple):
         return 1.0 - self.none * (1.0 - self.unexplained)
 
 
-def judge(finding: Finding, gap: Gap, extra: dict[str, float], simulator: Simulator | None = None) -> Judgement:
+def judge(
+    finding: Finding,
+    gap: Gap,
+    extra: dict[str, float],
+    simulator: Simulator | None = None,
+    laws: Sequence[Shown] = (),
+) -> Judgement:
     """Probabilities from the log evidence of the selected set and its neighbours, from what they leave unexplained, and
     from effects that show in the frames or in the noise law (`extra`: name to evidence). What the simulator has already
-    is no gap."""
+    is no gap. laws: discovered ones that the nominal model has not."""
     known_there = () if simulator is None else simulator.effects
     sure = {name for name, evidence in extra.items() if evidence > CLAIMED} - set(known_there)
     top = max(finding.values.values())
     total = sum(np.exp(value - top) for value in finding.values.values())
-    unexplained = unexplained_probability(finding, gap, simulator)
+    explained = 1.0 - unexplained_probability(finding, gap, simulator)
+    unexplained = 1.0 - explained * (1.0 - lawful_probability(laws, finding.selected))
     sets: dict[tuple[str, ...], float] = {}
     for effects, value in finding.values.items():
         key = tuple(sorted({*effects - set(known_there), *sure}))
@@ -100,6 +110,13 @@ def unexplained_probability(finding: Finding, gap: Gap, simulator: Simulator | N
     slipping = _beyond(slip_of_drive(finding), believable_slip(simulator))
     slipping *= _logistic((gap.left - HIDDEN) / HIDDEN_SHARPNESS)
     return 1.0 - (1.0 - explained) * (1.0 - missed) * (1.0 - slipping)
+
+
+def lawful_probability(laws: Sequence[Shown], selected: Sequence[str]) -> float:
+    """How sure it is that a law takes part in whose place no selected effect acts: that of the surest such law, but no
+    surer than RESAMPLES of the judging rows can tell."""
+    unlike = [law for law in laws if not {*BY_KIND.get(law.kind.names, ())} & {*selected}]
+    return max((1.0 - max(law.p_value, 1.0 / RESAMPLES) for law in unlike), default=0.0)
 
 
 def rest_of(finding: Finding, simulator: Simulator | None = None) -> float:

@@ -18,11 +18,11 @@ def lead(found: Diagnosis) -> str:
 
 
 def details(found: Diagnosis) -> str:
-    """What the headline leaves out: shares, known effects of another size, look-alikes, what was refused, noise that is
-    too large, and rates that are no measurement; empty where there is nothing of that."""
+    """What the headline leaves out: shares, known effects of another size, look-alikes, effects that were refused or
+    are needless, noise that is too large, and rates that are no measurement; empty where there is nothing of that."""
     named = found.verdict in ("effects", "partly")
     own = f"{_due(found)}{_resized(found)}{_doubt(found)}" if named else ""
-    others = [f" {told}" for told in (refusal(found), too_much_noise(found)) if told]
+    others = [f" {told}" for told in (refusal(found), needless(found), too_much_noise(found)) if told]
     held = [f" {line[0].upper()}{line[1:]}." for line in found.suspicions if line in COASTED]
     return f"{own}{''.join((*others, *held))}".strip()
 
@@ -41,6 +41,18 @@ def refusal(found: Diagnosis) -> str:
     return (
         f"{names[0].upper()}{names[1:]} {fit} the runs for naming, but with {it} the model predicts the runs kept for "
         f"judging worse (95 % sure). So the corrected model has not got {it}."
+    )
+
+
+def needless(found: Diagnosis) -> str:
+    """Effects that discovered laws make needless, in a sentence; nothing where there are none."""
+    if not found.superseded:
+        return ""
+    names, one = together(found.superseded), len(found.superseded) == 1
+    was, it = ("was", "it") if one else ("were", "them")
+    return (
+        f"{names[0].upper()}{names[1:]} {was} named at first. Beside what was discovered nothing speaks for {it}, and "
+        f"the corrected model has not got {it}."
     )
 
 

@@ -14,6 +14,7 @@ from jaxident.diagnosis.account.models import placebo_of, players_of, with_playe
 from jaxident.diagnosis.account.refused import refused
 from jaxident.diagnosis.account.shrink import HIGH, LOW, Shrink, interval, shrink_of
 from jaxident.diagnosis.account.sized import REPLAYS, sized_corrected
+from jaxident.diagnosis.account.superseded import superseded
 from jaxident.diagnosis.account.where import Place, increments, locate
 from jaxident.diagnosis.causes.discrepancy import UNEXPLAINED
 from jaxident.diagnosis.causes.finding import Finding
@@ -77,7 +78,7 @@ def _root(squares: Array) -> float:
 
 class Measured(NamedTuple):
     """All that the judging rows tell, the corrected model of which they tell it, the laws that were discovered, and
-    named effects that these rows refuse."""
+    named effects that these rows refuse, and those that the laws make needless."""
 
     gap: Gap
     account: Account
@@ -86,6 +87,7 @@ class Measured(NamedTuple):
     model: Model
     discovered: tuple[Shown, ...]
     refused: tuple[str, ...]
+    superseded: tuple[str, ...]
 
 
 def measure(prepared: Prepared, finding: Finding, given: Model | None, common, direct: dict, seed: int = 0) -> Measured:
@@ -126,7 +128,8 @@ def measure(prepared: Prepared, finding: Finding, given: Model | None, common, d
     place = locate(errors[1], floor.total / unit, everybody.path, prepared, moved, seed)
     laws = () if shown is None else each_law(prepared, shown, errors[1], unit, seed)
     return Measured(gap, account, place, shrinks, corrected.model if shown is None else shown.model, laws,
-                    refused(judged, players, last, unit, seed))  # fmt: skip
+                    refused(judged, players, last, unit, seed),
+                    () if shown is None else superseded(finding, shown.bending))  # fmt: skip
 
 
 def _levels(errors: Array) -> tuple[float, float, float, float]:
