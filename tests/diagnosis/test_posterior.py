@@ -5,12 +5,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support.diagnoses import finding_of, made_up
+from support.diagnoses import discovered_law, finding_of, made_up
 
 from jaxident.diagnosis.causes.discrepancy_basis import Term
 from jaxident.diagnosis.decide import decide
 from jaxident.diagnosis.noise.law import Law
-from jaxident.diagnosis.posterior import alike, judge, slip_of_drive, unexplained_probability
+from jaxident.diagnosis.posterior import alike, judge, lawful_probability, slip_of_drive, unexplained_probability
 from jaxident.diagnosis.simulator import Simulator
 from jaxident.effects.coordinates import COORDINATES
 
@@ -43,6 +43,15 @@ def test_a_large_gain_names_its_effect():
     assert found.causes[0].effect == "slope"
     assert found.causes[0].probability > 0.99
     assert found.sites["contact"] > 0.99
+
+
+def test_a_confirmed_law_is_something_that_no_name_covers_unless_an_effect_acts_in_its_place():
+    law = discovered_law()
+    for names, told in (((), 0.95), (("slope",), 0.95), (("turn_loss",), 0.0)):
+        found = [judge(finding({names: 500.0}, names), GAP, NONE, None, laws) for laws in ((), (law,))]
+        assert found[1].unexplained > told
+        assert (found[1].unexplained > found[0].unexplained + 0.5) == bool(told)
+    assert lawful_probability([law._replace(p_value=0.0)], ()) < 1.0
 
 
 def test_probabilities_are_those_of_the_log_evidence():

@@ -76,6 +76,8 @@ def test_table_and_page_tell_of_every_robot(tmp_path):
         ("hot", Kind("push of each wheel", "own push", "own heat 3 s")),
         ("castor", Kind("acceleration along", "v", "since reversal")),
         ("coupled", Kind("acceleration in heading", "w", "v")),
+        ("late", Kind("push of each wheel", "own change 0.03 s", "v")),
+        ("brakes", Kind("push of each wheel", "1", "own speed", "own push")),
     ],
 )
 def test_the_law_that_is_found_first_acts_where_the_hidden_effect_does(hidden, first):

@@ -302,6 +302,12 @@ def test_what_the_judging_runs_refuse_is_told_in_a_sentence():
     assert told.endswith("So the corrected model has not got them.")
 
 
+def test_names_that_laws_make_needless_are_told_in_a_sentence():
+    assert "named at first" not in lead(made_up("partly"))
+    told = lead(made_up("unknown")._replace(superseded=("traction_limit",)))
+    assert "Traction limit was named at first. Beside what was discovered nothing speaks for it" in told
+
+
 def test_the_worst_stretches_are_drawn_with_both_models():
     found = made_up("effects")
     errors = np.ones_like(found.gap.errors)

@@ -18,9 +18,10 @@ def superseded(finding: Finding, bending: Bending) -> tuple[str, ...]:
     """Effects of the finding that are worth less than SURE beside the laws, by refits without them; the one that is
     worth least leaves first. An effect in whose place a law acts stays: the law is what its form lacks. Where wheels
     are measured all stay, for poses alone judge a law."""
-    windows, curves = finding.data.windows, bending.curves
+    windows = finding.data.windows
     if windows.wheels is not None:
         return ()
+    curves = bending.curves
     alike = {name for curve in curves for name in BY_KIND.get(curve.kind.names, ())}
     names = [name for name in finding.selected if name not in alike]
     count, gone, data = len(finding.selected), [], whiten(bending.fit, windows, bending.law)[0]

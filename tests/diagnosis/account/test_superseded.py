@@ -1,0 +1,57 @@
+"""Names that discovered laws make needless."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from support.diagnoses import made_up
+from support.small_robot import LAW, nominal_fit, robot_with, windows_of
+
+from jaxident.diagnosis.account.superseded import superseded
+from jaxident.diagnosis.diagnose import worse
+from jaxident.diagnosis.discovery.fit import Bending, Curve, refit_with
+from jaxident.diagnosis.discovery.kinds import Kind
+from jaxident.diagnosis.fit.refit import refit
+
+AT = np.linspace(-1.0, 1.0, 10)
+LAW_OF_PUSH = Curve(Kind("push of each wheel", "1", "own push"), (AT,), np.zeros(10), np.zeros(10), 1e-2, np.ones(10))
+
+
+@pytest.fixture(scope="module")
+def turning():
+    """Windows of a robot that loses speed in turns."""
+    return windows_of(robot_with({("turn_loss", "loss"): 0.3}))
+
+
+def needless(windows, names):
+    """Of some effects, beside a law of each wheel's own push, those that nothing speaks for."""
+    data, nominal = nominal_fit(windows)
+    fit, curves, covariance = refit_with(data, refit(data, nominal.vector, nominal.starts, names), (LAW_OF_PUSH,))
+    finding = SimpleNamespace(data=data, selected=names)
+    return superseded(finding, Bending(fit, curves, covariance, LAW))
+
+
+@pytest.mark.slow
+def test_a_true_effect_stays_and_a_false_one_goes(turning):
+    assert needless(turning, ("turn_loss", "quadratic_drag")) == ("quadratic_drag",)
+
+
+@pytest.mark.slow
+def test_an_effect_in_whose_place_the_law_acts_stays(turning):
+    assert needless(turning, ("direction_gain",)) == ()
+
+
+def test_where_wheels_are_measured_all_effects_stay():
+    windows = SimpleNamespace(wheels=np.zeros(3))
+    finding = SimpleNamespace(data=SimpleNamespace(windows=windows), selected=("quadratic_drag",))
+    assert superseded(finding, None) == ()
+
+
+def test_a_gap_that_is_larger_by_more_than_chance_is_worse():
+    gap = made_up("effects").gap
+    rng = np.random.default_rng(0)
+    errors = 4.0 + rng.uniform(size=gap.errors.shape)
+    near, far = (gap._replace(errors=factor * errors) for factor in (1.0, 2.0))
+    assert worse(far, near, 0)
+    assert not worse(near, far, 0)
+    assert not worse(near, near, 0)
