@@ -160,7 +160,8 @@ def shrink(found: Diagnosis) -> Section:
         if one.value is not None and one.interval is not None and plain(name) not in rows:
             rows[plain(name)] = one.value, one.interval, "placebo" if name == weak else "other effects, alone"
     if not rows:
-        return Section("How far the gap shrinks", [NOTHING_TO_SHRINK])
+        told = NOTHING_TO_SHRINK if gap.shrink.value is None else NOTHING_NAMED
+        return Section("How far the gap shrinks", [told])
     figure, ax = plot.figure(size=(PHONE, 1.0 + _row(rows) * max(len(rows), 2)))
     plot.shrinks({n: row[0] for n, row in rows.items()}, {n: row[1] for n, row in rows.items()},
                  groups={n: row[2] for n, row in rows.items()}, ax=ax)  # fmt: skip
@@ -170,6 +171,7 @@ def shrink(found: Diagnosis) -> Section:
 NOTHING_TO_SHRINK = (
     "With its parameters refitted, the nominal model's error does not stand out from noise: no gap is left to shrink."
 )
+NOTHING_NAMED = "No effect is named, so none shrinks the gap. Discovered laws, if any, have a section of their own."
 SHRINK = (
     "0 % leaves the gap as it is after the nominal parameters are refitted, 100 % brings it down to the floor; beyond, "
     "the error came out below the floor. All on stretches that took no part in finding the effect. Intervals (90 %) "

@@ -9,6 +9,7 @@ from support.diagnoses import LARGEST, VERDICTS, discovered_law, finding_of, mad
 from jaxident.cli.diagnose import _told
 from jaxident.diagnosis.account.discovered import Shown
 from jaxident.diagnosis.account.odometry import Odometry
+from jaxident.diagnosis.account.shrink import Shrink
 from jaxident.diagnosis.decide import Parameter, advice
 from jaxident.diagnosis.diagnose import COASTED
 from jaxident.diagnosis.discovery.forms import PATCH, Form
@@ -204,6 +205,14 @@ def test_no_gap_has_no_map_and_nothing_to_shrink():
     page = page_of("no_gap")
     parts = section(page, "Where it lies"), section(page, "How far the gap shrinks")
     assert not any(isinstance(block, Figure) for part in parts for block in part.blocks)
+    assert "no gap is left to shrink" in parts[1].blocks[0]
+
+
+def test_a_gap_without_a_name_is_not_called_noise():
+    found = made_up("unknown")
+    found = found._replace(gap=found.gap._replace(shrink=Shrink(0.0, (0.0, 0.0))), shrinks={})
+    (told,) = section(diagnosis_page(found, "runs"), "How far the gap shrinks").blocks
+    assert told.startswith("No effect is named, so none shrinks the gap.")
 
 
 def test_hidden_effects_come_first_with_the_smallest_visible_size():
