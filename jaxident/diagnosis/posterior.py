@@ -14,8 +14,8 @@ from jaxident.effects.catalogue import BY_KIND, CATALOGUE, SITES
 
 SIGNIFICANT, SHARE = 20.0, 0.05
 """Fall of -log p that terms in no catalogue must bring beyond the best set, and their part of all that is explained,
-for something to take part that has no name. On simulated robots with one effect of the catalogue beside one of none the
-part was 0.05 to 0.9."""
+for something to take part that has no name. A discovered law must take that part of the error away. On simulated robots
+with one effect of the catalogue beside one of none the part of the terms was 0.05 to 0.9."""
 SHARPNESS = 0.01, 4.0
 """Width of both thresholds: how slowly probability passes from known to unknown."""
 HIDDEN, HIDDEN_SHARPNESS = 0.2, 0.04
@@ -113,9 +113,10 @@ def unexplained_probability(finding: Finding, gap: Gap, simulator: Simulator | N
 
 
 def lawful_probability(laws: Sequence[Shown], selected: Sequence[str]) -> float:
-    """How sure it is that a law takes part in whose place no selected effect acts: that of the surest such law, but no
-    surer than RESAMPLES of the judging rows can tell."""
-    unlike = [law for law in laws if not {*BY_KIND.get(law.kind.names, ())} & {*selected}]
+    """How sure it is that a law takes part in whose place no selected effect acts, and which takes away more than SHARE
+    of the error: that of the surest such law, but no surer than RESAMPLES of the judging rows can tell."""
+    large = [law for law in laws if law.share > SHARE]
+    unlike = [law for law in large if not {*BY_KIND.get(law.kind.names, ())} & {*selected}]
     return max((1.0 - max(law.p_value, 1.0 / RESAMPLES) for law in unlike), default=0.0)
 
 

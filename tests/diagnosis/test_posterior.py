@@ -51,7 +51,8 @@ def test_a_confirmed_law_is_something_that_no_name_covers_unless_an_effect_acts_
         found = [judge(finding({names: 500.0}, names), GAP, NONE, None, laws) for laws in ((), (law,))]
         assert found[1].unexplained > told
         assert (found[1].unexplained > found[0].unexplained + 0.5) == bool(told)
-    assert lawful_probability([law._replace(p_value=0.0)], ()) < 1.0
+    assert 0.99 < lawful_probability([law._replace(p_value=0.0)], ()) < 1.0
+    assert lawful_probability([law._replace(share=0.01)], ()) == 0.0
 
 
 def test_probabilities_are_those_of_the_log_evidence():
