@@ -7,7 +7,7 @@ import pytest
 from support.diagnoses import made_up
 from support.small_robot import LAW, nominal_fit, robot_with, windows_of
 
-from jaxident.diagnosis.account.superseded import superseded
+from jaxident.diagnosis.account.superseded import _owners, superseded
 from jaxident.diagnosis.diagnose import worse
 from jaxident.diagnosis.discovery.fit import Bending, Curve, refit_with
 from jaxident.diagnosis.discovery.kinds import Kind
@@ -19,15 +19,22 @@ LAW_OF_PUSH = Curve(Kind("push of each wheel", "1", "own push"), (AT,), np.zeros
 
 @pytest.fixture(scope="module")
 def turning():
-    """Windows of a robot that loses speed in turns."""
-    return windows_of(robot_with({("turn_loss", "loss"): 0.3}))
+    """Windows of a robot that loses speed in turns, and whose wheels turn faster forward than backward."""
+    sizes = {("turn_loss", "loss"): 0.3, ("direction_gain", "right"): 0.1, ("direction_gain", "left"): 0.1}
+    return windows_of(robot_with(sizes))
+
+
+def found(windows, names):
+    """A finding of some effects."""
+    data, nominal = nominal_fit(windows)
+    fit = refit(data, nominal.vector, nominal.starts, names)
+    return SimpleNamespace(data=data, selected=names, fit=fit)
 
 
 def needless(windows, names):
     """Of some effects, beside a law of each wheel's own push, those that nothing speaks for."""
-    data, nominal = nominal_fit(windows)
-    fit, curves, covariance = refit_with(data, refit(data, nominal.vector, nominal.starts, names), (LAW_OF_PUSH,))
-    finding = SimpleNamespace(data=data, selected=names)
+    finding = found(windows, names)
+    fit, curves, covariance = refit_with(finding.data, finding.fit, (LAW_OF_PUSH,))
     return superseded(finding, Bending(fit, curves, covariance, LAW))
 
 
@@ -39,6 +46,13 @@ def test_a_true_effect_stays_and_a_false_one_goes(turning):
 @pytest.mark.slow
 def test_an_effect_in_whose_place_the_law_acts_stays(turning):
     assert needless(turning, ("direction_gain",)) == ()
+
+
+@pytest.mark.slow
+def test_an_effect_owns_what_it_explains_unless_laws_bring_a_fifth_as_much(turning):
+    finding = found(turning, ("turn_loss", "direction_gain"))
+    for brought, owners in ((1.0, {"turn_loss", "direction_gain"}), (1e6, set())):
+        assert _owners(finding.data, finding, finding.fit.cost - brought) == owners
 
 
 def test_where_wheels_are_measured_all_effects_stay():
