@@ -65,7 +65,7 @@ class Diagnosis(NamedTuple):
         suspicions: what the log says against itself, with the option that mends it, a line each.
         refused: effects that fit the runs for naming, and without which the judging runs are predicted better (95 %
             sure). The corrected model has none of them.
-        superseded: effects that were named before the laws were discovered, and for which nothing speaks beside these.
+        needless: effects that were named before the laws were discovered, and for which nothing speaks beside these.
             The corrected model has none of them, either.
         odometry: the judging stretches as the wheels tell them; None without wheel speeds.
     """
@@ -90,7 +90,7 @@ class Diagnosis(NamedTuple):
     discovered: tuple[Shown, ...] = ()
     suspicions: tuple[str, ...] = ()
     refused: tuple[str, ...] = ()
-    superseded: tuple[str, ...] = ()
+    needless: tuple[str, ...] = ()
     odometry: Odometry | None = None
 
     @property
@@ -145,7 +145,7 @@ def diagnose(
     prepared, finding = find_effects(prepare(logs, horizon, None if simulator is None else simulator.vector[:10]))
     if sim is not None:
         simulator, finding = inspect_simulator(sim, prepared, finding)
-    (finding, extra, shown, measured), refused, superseded = believed(prepared, finding, simulator, model, seed)
+    (finding, extra, shown, measured), refused, needless = believed(prepared, finding, simulator, model, seed)
     gap, account, where, shrinks, corrected, laws, *_ = measured
     told = None if simulator is None else simulator.vector
     common, surplus = shared(shown, simulator)
@@ -158,7 +158,7 @@ def diagnose(
     return Diagnosis(verdict, judgement, gap, account, where, selected, parameters, visible(known), replay(known, seed),
                      advice(verdict, judgement, laws, prepared.whole), nominal, corrected, shrinks, prepared, finding,
                      surplus, simulator, laws, suspicions_of(join(logs), prepared),
-                     refused, superseded, odometry(prepared, gap.paths, corrected))  # fmt: skip
+                     refused, needless, odometry(prepared, gap.paths, corrected))  # fmt: skip
 
 
 class Seen(NamedTuple):
@@ -182,7 +182,7 @@ def believed(
     while more := seen.measured.refused:
         refused = (*refused, *more)
         seen = see(prepared, finding_without(seen.finding, more), simulator, model, seed)
-    needless = seen.measured.superseded
+    needless = seen.measured.needless
     if needless:
         other = see(prepared, finding_without(seen.finding, needless), simulator, model, seed)
         if not other.measured.refused and not worse(other.measured.gap, seen.measured.gap, seed):

@@ -42,7 +42,7 @@ def diagnosis_to_dict(found: Diagnosis) -> dict[str, Any]:
         "causes": _causes(found),
         "selected": list(found.selected),
         "refused": list(found.refused),
-        "superseded": list(found.superseded),
+        "needless": list(found.needless),
         "wheels": None if found.odometry is None else _wheels(found.odometry),
         "discovered": [law_to_dict(one) for one in found.discovered] or None,
         "surplus": list(found.surplus),

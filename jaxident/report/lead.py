@@ -46,9 +46,9 @@ def refusal(found: Diagnosis) -> str:
 
 def needless(found: Diagnosis) -> str:
     """Effects that discovered laws make needless, in a sentence; nothing where there are none."""
-    if not found.superseded:
+    if not found.needless:
         return ""
-    names, one = together(found.superseded), len(found.superseded) == 1
+    names, one = together(found.needless), len(found.needless) == 1
     was, it = ("was", "it") if one else ("were", "them")
     return (
         f"{names[0].upper()}{names[1:]} {was} named at first. Beside what was discovered nothing speaks for {it}, and "

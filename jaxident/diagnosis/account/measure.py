@@ -11,10 +11,10 @@ from jaxident.diagnosis.account.account import Account, account_of
 from jaxident.diagnosis.account.discovered import Shown, confirm, each_law
 from jaxident.diagnosis.account.floor import Floor, floor_of
 from jaxident.diagnosis.account.models import placebo_of, players_of, with_players, without
+from jaxident.diagnosis.account.needless import needless
 from jaxident.diagnosis.account.refused import refused
 from jaxident.diagnosis.account.shrink import HIGH, LOW, Shrink, interval, shrink_of
 from jaxident.diagnosis.account.sized import REPLAYS, sized_corrected
-from jaxident.diagnosis.account.superseded import superseded
 from jaxident.diagnosis.account.where import Place, increments, locate
 from jaxident.diagnosis.causes.discrepancy import UNEXPLAINED
 from jaxident.diagnosis.causes.finding import Finding
@@ -87,7 +87,7 @@ class Measured(NamedTuple):
     model: Model
     discovered: tuple[Shown, ...]
     refused: tuple[str, ...]
-    superseded: tuple[str, ...]
+    needless: tuple[str, ...]
 
 
 def measure(prepared: Prepared, finding: Finding, given: Model | None, common, direct: dict, seed: int = 0) -> Measured:
@@ -129,7 +129,7 @@ def measure(prepared: Prepared, finding: Finding, given: Model | None, common, d
     laws = () if shown is None else each_law(prepared, shown, errors[1], unit, seed)
     return Measured(gap, account, place, shrinks, corrected.model if shown is None else shown.model, laws,
                     refused(judged, players, last, unit, seed),
-                    () if shown is None else superseded(finding, shown.bending))  # fmt: skip
+                    () if shown is None else needless(finding, shown.bending))  # fmt: skip
 
 
 def _levels(errors: Array) -> tuple[float, float, float, float]:

@@ -19,7 +19,7 @@ from jaxident.effects.catalogue import BY_KIND
 from jaxident.effects.coordinates import NOMINAL, PLACES, neutral_vector
 
 
-def superseded(finding: Finding, bending: Bending) -> tuple[str, ...]:
+def needless(finding: Finding, bending: Bending) -> tuple[str, ...]:
     """Effects of the finding that are worth less than SURE beside the laws, by refits without them; the one that is
     worth least leaves first. An effect in whose place a law acts stays: the law is what its form lacks. So does one
     that owns what it explains (`_owners`). Where wheels are measured all stay, for poses alone judge a law."""

@@ -7,7 +7,7 @@ import pytest
 from support.diagnoses import made_up
 from support.small_robot import LAW, nominal_fit, robot_with, windows_of
 
-from jaxident.diagnosis.account.superseded import _owners, superseded
+from jaxident.diagnosis.account.needless import _owners, needless
 from jaxident.diagnosis.diagnose import worse
 from jaxident.diagnosis.discovery.fit import Bending, Curve, refit_with
 from jaxident.diagnosis.discovery.kinds import Kind
@@ -31,21 +31,21 @@ def found(windows, names):
     return SimpleNamespace(data=data, selected=names, fit=fit)
 
 
-def needless(windows, names):
+def without_need(windows, names):
     """Of some effects, beside a law of each wheel's own push, those that nothing speaks for."""
     finding = found(windows, names)
     fit, curves, covariance = refit_with(finding.data, finding.fit, (LAW_OF_PUSH,))
-    return superseded(finding, Bending(fit, curves, covariance, LAW))
+    return needless(finding, Bending(fit, curves, covariance, LAW))
 
 
 @pytest.mark.slow
 def test_a_true_effect_stays_and_a_false_one_goes(turning):
-    assert needless(turning, ("turn_loss", "quadratic_drag")) == ("quadratic_drag",)
+    assert without_need(turning, ("turn_loss", "quadratic_drag")) == ("quadratic_drag",)
 
 
 @pytest.mark.slow
 def test_an_effect_in_whose_place_the_law_acts_stays(turning):
-    assert needless(turning, ("direction_gain",)) == ()
+    assert without_need(turning, ("direction_gain",)) == ()
 
 
 @pytest.mark.slow
@@ -58,7 +58,7 @@ def test_an_effect_owns_what_it_explains_unless_laws_bring_a_fifth_as_much(turni
 def test_where_wheels_are_measured_all_effects_stay():
     windows = SimpleNamespace(wheels=np.zeros(3))
     finding = SimpleNamespace(data=SimpleNamespace(windows=windows), selected=("quadratic_drag",))
-    assert superseded(finding, None) == ()
+    assert needless(finding, None) == ()
 
 
 def test_a_gap_that_is_larger_by_more_than_chance_is_worse():
