@@ -108,12 +108,12 @@ def _oval(push: np.ndarray, now: Now, size: float) -> np.ndarray:
 
 
 def _late(push: np.ndarray, now: Now, size: float) -> np.ndarray:
-    """A busy link: commands arrive the later, the faster the robot is."""
+    """A busy link: commands arrive the later, the faster the robot is, 0.2 s at 1 m/s."""
     return np.where(now.age < 0.2 * size * np.abs(now.v), now.older, push)
 
 
 def _brakes(push: np.ndarray, now: Now, size: float) -> np.ndarray:
-    """A driver that lets its motors run out: a push against the wheel's speed is weaker."""
+    """A driver that lets its motors run out: a push against the wheel's speed is half as large, beyond 0.03 m/s."""
     return push * (1.0 - 0.5 * size * np.clip(-np.sign(push) * now.rim / 0.03, 0.0, 1.0))
 
 
@@ -125,8 +125,9 @@ FORCES: dict[str, Callable[[Now, float, np.random.Generator], Added]] = {
     "patch": _patch, "swirl": _swirl, "saddle": _saddle, "turning": _turning, "friction": _friction,
     "coupled": _coupled, "castor": _castor, "bumps": _bumps,
 }  # fmt: skip
-INPUTS: dict[str, Callable[[np.ndarray, Now, float], np.ndarray]] = {"hot": _hot, "cogs": _cogs, "oval": _oval,
-                                                                        "late": _late, "brakes": _brakes}  # fmt: skip
+INPUTS: dict[str, Callable[[np.ndarray, Now, float], np.ndarray]] = {
+    "hot": _hot, "cogs": _cogs, "oval": _oval, "late": _late, "brakes": _brakes,
+}  # fmt: skip
 KINDS = {**{name: law.__doc__ for name, law in (FORCES | INPUTS).items()}, "nothing": "The nominal robot."}
 """What may be hidden in a robot, in words."""
 

@@ -10,7 +10,7 @@ from jaxident.diagnosis.account.measure import Gap
 from jaxident.diagnosis.account.shrink import RESAMPLES
 from jaxident.diagnosis.causes.finding import CLAIMED, Finding
 from jaxident.diagnosis.simulator import Simulator
-from jaxident.effects.catalogue import BY_KIND, CATALOGUE, SITES
+from jaxident.effects.catalogue import CATALOGUE, SITES
 
 SIGNIFICANT, SHARE = 20.0, 0.05
 """Fall of -log p that terms in no catalogue must bring beyond the best set, and their part of all that is explained,
@@ -116,7 +116,7 @@ def lawful_probability(laws: Sequence[Shown], selected: Sequence[str]) -> float:
     """How sure it is that a law takes part in whose place no selected effect acts, and which takes away more than SHARE
     of the error: that of the surest such law, but no surer than RESAMPLES of the judging rows can tell."""
     large = [law for law in laws if law.share > SHARE]
-    unlike = [law for law in large if not {*BY_KIND.get(law.kind.names, ())} & {*selected}]
+    unlike = [law for law in large if not {*law.kind.effects} & {*selected}]
     return max((1.0 - max(law.p_value, 1.0 / RESAMPLES) for law in unlike), default=0.0)
 
 

@@ -13,7 +13,7 @@ from jaxident.diagnosis.account.where import OF_COMMANDS, Region
 from jaxident.diagnosis.detectability import Replay
 from jaxident.diagnosis.diagnose import Diagnosis
 from jaxident.diagnosis.preparation.prepare import Prepared
-from jaxident.effects.catalogue import BY_KIND, CATALOGUE
+from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.law_kinds import MEMORIES, knots_by_signal
 
 SCHEMA = "jaxident.diagnosis/2"
@@ -96,7 +96,7 @@ def law_to_dict(shown: Shown) -> dict[str, Any]:
         "p_value": shown.p_value,
         "looks_like": None if form is None else form._asdict(),
         "alike": [kind._asdict() for kind in shown.alike],
-        "effects_there": list(BY_KIND.get(shown.kind.names, ())),
+        "effects_there": list(shown.kind.effects),
     }
 
 

@@ -9,7 +9,6 @@ from jaxident.diagnosis.account.discovered import Shown
 from jaxident.diagnosis.diagnose import Diagnosis
 from jaxident.diagnosis.discovery.forms import PATCH, beyond
 from jaxident.diagnosis.discovery.kinds import Kind
-from jaxident.effects.catalogue import BY_KIND
 from jaxident.effects.law_kinds import CHANGES, HEATS, SIGNALS, value_unit
 from jaxident.report.page import Figure, Section, Table
 from jaxident.report.words import number, percent, plain, together
@@ -92,9 +91,8 @@ def _other_forms(found: Diagnosis) -> list[str]:
     """A line for each law that may be an effect of the catalogue in another form."""
     lines = []
     for shown in found.discovered:
-        names = BY_KIND.get(shown.kind.names, ())
-        if names:
-            told = together(map(plain, names), "or")
+        if shown.kind.effects:
+            told = together(map(plain, shown.kind.effects), "or")
             lines.append(f"{_place(shown.kind)}: this may be {told} in another form than the catalogue's.")
     return lines
 

@@ -34,26 +34,24 @@ def headline(found: Diagnosis) -> str:
 
 def refusal(found: Diagnosis) -> str:
     """Effects that the judging runs refuse, in a sentence; nothing where there are none."""
-    if not found.refused:
-        return ""
-    names, one = together(found.refused), len(found.refused) == 1
-    fit, it = ("fits", "it") if one else ("fit", "them")
-    return (
-        f"{names[0].upper()}{names[1:]} {fit} the runs for naming, but with {it} the model predicts the runs kept for "
-        f"judging worse (95 % sure). So the corrected model has not got {it}."
-    )
+    why = "the runs for naming, but with {it} the model predicts the runs kept for judging worse (95 % sure). So"
+    return _without(found.refused, ("fits", "fit"), why)
 
 
 def needless(found: Diagnosis) -> str:
     """Effects that discovered laws make needless, in a sentence; nothing where there are none."""
-    if not found.needless:
+    why = "named at first. Beside what was discovered nothing speaks for {it}, and"
+    return _without(found.needless, ("was", "were"), why)
+
+
+def _without(effects: tuple[str, ...], verbs: tuple[str, str], why: str) -> str:
+    """Why the corrected model lacks some effects; verbs: for one and for several. Nothing where there are none."""
+    if not effects:
         return ""
-    names, one = together(found.needless), len(found.needless) == 1
-    was, it = ("was", "it") if one else ("were", "them")
-    return (
-        f"{names[0].upper()}{names[1:]} {was} named at first. Beside what was discovered nothing speaks for {it}, and "
-        f"the corrected model has not got {it}."
-    )
+    names, number = together(effects), int(len(effects) > 1)
+    it = ("it", "them")[number]
+    begin = f"{names[0].upper()}{names[1:]} {verbs[number]} {why.format(it=it)}"
+    return f"{begin} the corrected model has not got {it}."
 
 
 def too_much_noise(found: Diagnosis) -> str:

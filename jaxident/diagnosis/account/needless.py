@@ -15,7 +15,6 @@ from jaxident.diagnosis.causes.search_rounds import SURE
 from jaxident.diagnosis.causes.settled import whiten
 from jaxident.diagnosis.discovery.fit import Bending, refit_with
 from jaxident.diagnosis.fit.refit import Data, Solution, refit
-from jaxident.effects.catalogue import BY_KIND
 from jaxident.effects.coordinates import NOMINAL, PLACES, neutral_vector
 
 
@@ -28,7 +27,7 @@ def needless(finding: Finding, bending: Bending) -> tuple[str, ...]:
         return ()
     curves, data = bending.curves, whiten(bending.fit, windows, bending.law)[0]
     now, count, gone = refit_with(data, bending.fit, curves)[0], len(finding.selected), []
-    kept = {name for curve in curves for name in BY_KIND.get(curve.kind.names, ())}
+    kept = {name for curve in curves for name in curve.kind.effects}
     kept |= _owners(data, finding, now.cost)
     names = [name for name in finding.selected if name not in kept]
     while names:

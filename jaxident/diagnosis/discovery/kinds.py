@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from jaxident.effects.catalogue import BY_KIND
 from jaxident.effects.law_kinds import AHEAD, ALONG, BY_CAMERA, CHANGES, HEADING, HEATS, LEFT, SIDEWAYS, TURN, WHEELS
 
 OF_FORCE = ("v", "w", "heading", "x", "y", "time", "push right", "push left", "since reversal")
@@ -14,7 +15,8 @@ SITE_OF_SIGNAL = {
     "push right": "actuation", "push left": "actuation", "since reversal": "contact", "own speed": "drive",
     "own push": "actuation", **dict.fromkeys([*HEATS, *CHANGES], "actuation"),
 }  # fmt: skip
-"""The site of a law that acts on accelerations or pushes, by its signal, or by what of the commands it multiplies."""
+"""The site of a law that acts on accelerations or pushes, by its signal; where a command's change is multiplied with a
+curve, by the change."""
 NOMINAL = ("v", "w", "push right", "push left", "own speed", "own push")
 """Signals on which a force of the nominal robot depends, in a straight line."""
 FLOOR = ((ALONG, "1"), (ALONG, "v"), (ALONG, "cos heading"), (ALONG, "sin heading"), (HEADING, "1"), (HEADING, "w"),
@@ -35,6 +37,11 @@ class Kind(NamedTuple):
     def names(self) -> tuple[str, ...]:
         """As an effect's record says in whose place it acts (`EffectRecord.kinds`)."""
         return tuple(filter(None, self))
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Effects of the catalogue in whose place such a law acts: it may be one of them in another form."""
+        return BY_KIND.get(self.names, ())
 
     @property
     def site(self) -> str:
