@@ -140,7 +140,8 @@ RECORDS = (
         source="Pacejka 2012, Tire and Vehicle Dynamics, ch. 4 (smooth saturation of the tyre force); dry: Coulomb "
                "friction under a wheel with inertia",
         parameters=(Parameter("limit", UNIT, float("inf"), (0.2, 2.0), 0.5, least=0.0, above=True),
-                    Parameter("dry", "", 0.0, (0.0, 1.0), 0.0, least=0.0, most=1.0, shape=True),
+                    Parameter("dry", "", 0.0, (0.0, 1.0), 0.0, least=0.0, most=1.0, shape=True,
+                              forms=("a tyre that yields", "a dry tyre that slides")),
                     Parameter("spin", "s", 0.0, (0.0, 0.1), 0.0, least=0.0, shape=True)),
         channels=BOTH,
         act=Grip(_slide, _lost), fast=Grip(_slide_fast, _lost_fast), confused_with=("motor_lag",), smooth=False,

@@ -44,6 +44,9 @@ STEPPED = _pairs("stepped")
 SHAPES = _pairs("shape")
 """Coordinates that shape an effect, whatever its size, and do nothing alone."""
 
+TWO_FORMS = sorted(STEPPED & SHAPES)
+"""Coordinates that choose between two forms of an effect, by 0 or 1: a tyre that yields or a dry one."""
+
 REACHED = {pair: next(c for c in COORDINATES[pair[0]] if c.name == pair[1]) for pair in sorted(_pairs("reach"))}
 """Coordinates by which -log p has many valleys, an instant, a phase or a step of a comb: looked for where it fits
 best."""

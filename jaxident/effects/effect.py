@@ -66,7 +66,7 @@ class Parameter(NamedTuple):
     neutral: the value at which the effect does nothing, or for a number that only shapes it (`shape`) its default.
     range: what real robots show, the bounds of a search. typical: a clear but not extreme case, for examples and
     pictures. least, most: what is refused outside; `above` refuses `least` itself. instant: a session time; where the
-    session's duration is known, its middle is typical.
+    session's duration is known, its middle is typical. forms: words for 0 and 1, where it chooses between two forms.
     """
 
     name: str
@@ -79,6 +79,7 @@ class Parameter(NamedTuple):
     above: bool = False
     shape: bool = False
     instant: bool = False
+    forms: tuple[str, ...] = ()
 
     @property
     def allowed(self) -> str:

@@ -164,11 +164,17 @@ def _short(value: float) -> str:
 
 
 def parameters(name: str, values: Mapping[str, float], deviations: Mapping[str, float] | None = None) -> str:
-    """The parameters of an effect with units: "right 0.052 ± 0.003 unit, left 0.048 ± 0.004 unit"."""
+    """The parameters of an effect with units: "limit 0.698 ± 0.001 unit, a tyre that yields". A shape that is neutral
+    and has no deviation is left out."""
     known = {parameter.name: parameter for parameter in CATALOGUE[name].parameters}
-    return ", ".join(
-        f"{plain(k)} {_parameter(known[k], float(v), (deviations or {}).get(k))}" for k, v in values.items()
-    )
+    deviations, said = deviations or {}, []
+    for key in values:
+        parameter, value = known[key], float(values[key])
+        if value in (0.0, 1.0) and parameter.forms:
+            said.append(parameter.forms[int(value)])
+        elif not parameter.shape or value != parameter.neutral or deviations.get(key):
+            said.append(f"{plain(key)} {_parameter(parameter, value, deviations.get(key))}")
+    return ", ".join(said)
 
 
 def _parameter(parameter: Parameter, value: float, deviation: float | None) -> str:

@@ -25,7 +25,19 @@ from jaxident.report.diagnosis import diagnosis_page
 from jaxident.report.lead import lead
 from jaxident.report.motor_or_ground import wheels_line
 from jaxident.report.stretches import SHOWN, draw_stretches, left_out, worst_starts, worst_stretches
-from jaxident.report.words import EFFECTS, LOOKS, SITES, chance, measured, number, parameters, percent, plain, together
+from jaxident.report.words import (
+    EFFECTS,
+    LOOKS,
+    SITES,
+    chance,
+    measured,
+    number,
+    parameters,
+    percent,
+    plain,
+    plain_text,
+    together,
+)
 from jaxident.robot.model import Discovered
 from jaxident.robot.wheel_sensor import WheelSensor
 
@@ -244,6 +256,7 @@ def test_words():
     assert plain_spaces(measured(27.1891, 0.0338, "m")) == "27.189 ± 0.034 m"
     assert plain_spaces(measured(-7e-5, 1.4e-4)) == "−0.00007 ± 0.00014"
     assert parameters("payload_change", {"ratio": 1.00388}) == "ratio 1.0039"
+
     assert [plain_spaces(chance(p)) for p in (0.0, 0.001, 0.5, 0.999, 1.0)] == [
         "0 %",
         "< 1 %",
@@ -253,6 +266,19 @@ def test_words():
     ]
     assert plain_spaces(percent(-0.3)) == "−30 %"
     assert together(["motor_lag", "slope", "backlash"], "or") == "motor lag, slope or backlash"
+
+
+def test_the_form_of_an_effect_is_told_in_words_and_a_shape_that_does_nothing_is_not():
+    def said(name, values, deviations=None):
+        return plain_text(parameters(name, values, deviations))
+
+    grip = {"limit": 0.7, "dry": 0.0, "spin": 0.0}
+    assert said("traction_limit", grip, {"limit": 0.001}) == "limit 0.7000 +- 0.0010 unit, a tyre that yields"
+    slides = said("traction_limit", {"limit": 0.7, "dry": 1.0, "spin": 0.02})
+    assert slides == "limit 0.7 unit, a dry tyre that slides, spin 0.02 s"
+    assert "a free wheel rolls on" in said("backlash", {"right": 0.1, "left": 0.1, "coasting": 1.0})
+    assert "dry 0.5" in said("traction_limit", {**grip, "dry": 0.5}), "between two forms it is a number"
+    assert "0.00 +- 0.10 rad" in said("slope", {"acceleration": 0.1, "direction": 0.0}, {"direction": 0.1})
 
 
 @pytest.mark.parametrize(("effects", "told"), [(("marker_offset",), False), (("marker_offset", "turn_loss"), True)])

@@ -17,7 +17,7 @@ from jaxident.diagnosis.causes.settled import Settled
 from jaxident.diagnosis.fit.refit import refit
 from jaxident.diagnosis.motion.linear import linearise
 from jaxident.diagnosis.noise.law import first_law
-from jaxident.effects.coordinates import NOMINAL, PLACES
+from jaxident.effects.coordinates import COORDINATES, NOMINAL, PLACES
 
 DELAY, LAG, LOSS = ("transport_delay", "delay"), ("motor_lag", "time_constant"), ("turn_loss", "loss")
 SAG, AHEAD = ("supply_sag", "resistance"), ("marker_offset", "ahead")
@@ -142,6 +142,31 @@ def test_a_look_alike_is_exchanged_for_what_it_looks_like(lagging):
     assert tried[frozenset({"motor_lag"})] == pytest.approx(found.evidence - now.evidence)
     assert found.fit.vector[PLACES[LAG]] == pytest.approx(0.1, abs=1e-3)
     assert found.fit.vector[PLACES[DELAY]] == 0.0
+
+
+GRIP, PLAY = "traction_limit", "backlash"
+LIMITED = {(GRIP, "inverse_square"): 3.0}
+DRY = {**LIMITED, (GRIP, "dry"): 1.0}
+LOOSE = {(PLAY, "right"): 0.03, (PLAY, "left"): 0.04}
+COASTING = {**LOOSE, (PLAY, "coasting"): 1.0}
+
+
+@pytest.mark.parametrize(
+    ("true", "begun"), [(LIMITED, DRY), (DRY, LIMITED), (LOOSE, COASTING), (COASTING, LOOSE)],
+    ids=["tyre", "dry", "resting", "coasting"],
+)  # fmt: skip
+def test_an_effect_in_the_wrong_form_takes_the_other(true, begun):
+    (name,) = {name for name, _ in true}
+    data, fit = fitted(windows_of(robot_with(true)), (name,), begun)
+    now = stands(fit, (name,))
+    found = better(data, tabulate(data, fit, (name,)), now, {frozenset({name}): 0.0})
+    assert found.effects == (name,)
+    assert found.evidence > now.evidence + ARRIVED
+    for pair in begun:
+        assert found.fit.vector[PLACES[pair]] == pytest.approx(true.get(pair, 0.0), rel=0.1)
+    table = tabulate(data, found.fit, (name,))
+    again = better(data, table, found, {frozenset({name}): 0.0}, without=COORDINATES)
+    assert again is None, "the true form stays"
 
 
 def test_a_set_that_was_refitted_is_not_tried_again_nor_one_that_the_catalogue_lacks(lagging):
