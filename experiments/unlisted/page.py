@@ -5,7 +5,6 @@ import pathlib
 import numpy as np
 
 from jaxident import plot
-from jaxident.effects.law_kinds import SIGNALS, value_unit
 from jaxident.report.page import Figure, Page, Section, Table, write_page
 from jaxident.robot.model import Discovered
 
@@ -54,8 +53,7 @@ def law_of(law: dict) -> Discovered:
 def _figure(told: dict) -> Figure:
     law = law_of(told)
     figure, ax = plot.figure(size=(6.3, 4.2 if law.second_signal else 2.2))
-    plot.discovered(law, told["rows"], ax=ax, xlabel=f"{law.signal} [{SIGNALS[law.signal]}]",
-                    ylabel=f"{law.acts_on}\n[{value_unit(law)}]")  # fmt: skip
+    plot.discovered(law, told["rows"], ax=ax)
     like = told["looks_like"]
     numbers = "" if like is None else ", ".join(f"{key} = {value:.3g}" for key, value in like["parameters"].items())
     times = "" if law.times == "1" else f"{law.times} times "

@@ -37,6 +37,14 @@ SIGNALS = {
 """What a curve may depend on, and the unit. time: session time. since reversal: since the commands' sum last changed
 its sign (`past`). own: of the wheel that is pushed; its speed is in the commands that hold it, its heat a mean of its
 squared command over some seconds, its change the command less the mean over them."""
+SIGNAL_WORDS = {
+    "v": "speed v", "w": "turn rate w", "heading": "heading", "x": "position x", "y": "position y",
+    "time": "session time", "push right": "push of the right wheel", "push left": "push of the left wheel",
+    "own speed": "speed of that wheel", "own push": "push of that wheel", "since reversal": "time since a reversal",
+    **{name: f"mean square of that wheel's command over {tau:g} s" for name, tau in HEATS.items()},
+    **{name: f"change of that wheel's command over {tau:g} s" for name, tau in CHANGES.items()},
+}  # fmt: skip
+"""Each signal in words."""
 OF_CAMERA = ("heading", "x", "y")
 """Signals that a camera's error may depend on."""
 TIMES = {"1": "", "v": "m/s", "w": "rad/s", "cos heading": "", "sin heading": "", "own push": UNIT,

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from jaxident.array_types import Array
-from jaxident.effects.law_kinds import SIGNALS
+from jaxident.effects.law_kinds import SIGNAL_WORDS, SIGNALS, value_unit
 from jaxident.plot import style
 from jaxident.robot.model import Discovered
 
@@ -17,9 +17,7 @@ SIGNED = "PuOr"
 """Colours of values of either sign, white at 0."""
 
 
-def discovered(
-    law: Discovered, density: Sequence[int] | None = None, *, xlabel: str = "", ylabel: str = "", ax: Axes | None = None
-) -> Axes:
+def discovered(law: Discovered, density: Sequence[int] | None = None, *, ax: Axes | None = None) -> Axes:
     """A discovered law; density (knots,): how many rows of the logs lie nearest to each knot, row by row for a surface.
 
     A curve has a band of two standard deviations, and grey bars for the density. A surface is a map: dots are knots,
@@ -27,8 +25,8 @@ def discovered(
     """
     ax = style.axes_or_new(ax, (style.WIDTH, 4.0 if law.second_signal else 2.2))
     counts = None if density is None or max(density, default=0) <= 0 else np.asarray(density, float) / max(density)
-    (_map if law.second_signal else _curve)(law, counts, ylabel or law.acts_on, ax)
-    ax.set_xlabel(xlabel or law.signal)
+    (_map if law.second_signal else _curve)(law, counts, f"{law.acts_on}\n[{value_unit(law)}]", ax)
+    ax.set_xlabel(_label(law.signal))
     return ax
 
 
@@ -66,4 +64,8 @@ def _map(law: Discovered, counts: Array | None, label: str, ax: Axes) -> None:
     bar.set_label(label)
     if {law.signal, law.second_signal} == {"x", "y"}:
         ax.set_aspect("equal", adjustable="box")
-    ax.set_ylabel(f"{law.second_signal} [{SIGNALS[law.second_signal]}]")
+    ax.set_ylabel(_label(law.second_signal))
+
+
+def _label(signal: str) -> str:
+    return f"{SIGNAL_WORDS[signal]} [{SIGNALS[signal]}]"

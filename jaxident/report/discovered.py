@@ -9,17 +9,10 @@ from jaxident.diagnosis.account.discovered import Shown
 from jaxident.diagnosis.diagnose import Diagnosis
 from jaxident.diagnosis.discovery.forms import PATCH, beyond
 from jaxident.diagnosis.discovery.kinds import Kind
-from jaxident.effects.law_kinds import CHANGES, HEATS, SIGNALS, value_unit
+from jaxident.effects.law_kinds import CHANGES, SIGNAL_WORDS
 from jaxident.report.page import Figure, Section, Table
 from jaxident.report.words import number, percent, plain, together
 
-SIGNAL_WORDS = {
-    "v": "speed v", "w": "turn rate w", "heading": "heading", "x": "position x", "y": "position y",
-    "time": "session time", "push right": "push of the right wheel", "push left": "push of the left wheel",
-    "own speed": "speed of that wheel", "own push": "push of that wheel", "since reversal": "time since a reversal",
-    **{name: f"mean square of that wheel's command over {tau:g} s" for name, tau in HEATS.items()},
-    **{name: f"change of that wheel's command over {tau:g} s" for name, tau in CHANGES.items()},
-}  # fmt: skip
 TIMES_WORDS = {
     "1": "", "v": "speed times ", "w": "turn rate times ", "own push": "push of that wheel times ",
     "cos heading": "the heading's cosine times ", "sin heading": "the heading's sine times ",
@@ -78,8 +71,7 @@ def _picture(shown: Shown) -> Figure:
     surface = bool(law.second_signal)
     figure, ax = plot.figure(size=(6.3, MAP_HEIGHT if surface else HEIGHT))
     told = dataclasses.replace(law, value=beyond(law, shown.density))
-    plot.discovered(told, shown.density, ax=ax, xlabel=f"{SIGNAL_WORDS[law.signal]} [{SIGNALS[law.signal]}]",
-                    ylabel=f"{law.acts_on}\n[{value_unit(law)}]")  # fmt: skip
+    plot.discovered(told, shown.density, ax=ax)
     if shown.form is not None and shown.form.form == PATCH:
         at = shown.form.parameters
         ax.add_patch(Circle((at["x0"], at["y0"]), at["radius"], fill=False, linestyle="--"))

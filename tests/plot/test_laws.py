@@ -26,7 +26,7 @@ def test_colours_of_a_map_are_the_values_where_they_are():
         near = np.hypot(x - place[0], y - place[1]).argmin()
         assert drawn.ravel()[near] == pytest.approx(value)
     assert ax.get_xlim()[0] < x.min() + 1e-9
-    assert "y [m]" in ax.get_ylabel()
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("position x [m]", "position y [m]")
 
 
 def test_knots_of_a_map_stand_where_they_are_and_are_hollow_where_nothing_is_known():

@@ -98,17 +98,9 @@ def better(data: Data, table: Table, now: Move, tried: dict[frozenset[str], floa
     `tried` gets the log evidence, less the present one, of each set that is refitted; those in it are not refitted
     again.
     """
-    for pair in REACHED:
-        if pair[0] in now.effects:
-            fit = refit(data, at_best(data, now.fit, pair), now.fit.starts, now.effects)
-            again = stands(fit, now.effects)
-            if again.evidence > now.evidence + ARRIVED:
-                return again
-    for pair in TWO_FORMS:
-        if pair[0] in now.effects:
-            again = _in_other_form(data, now, pair)
-            if again is not None and again.evidence > now.evidence + ARRIVED:
-                return again
+    for again in _elsewhere(data, now):
+        if again.evidence > now.evidence + ARRIVED:
+            return again
     for chosen, behind in _trials(table, now, without):
         key = frozenset(table.effects(chosen))
         if key in tried:
@@ -118,6 +110,17 @@ def better(data: Data, table: Table, now: Move, tried: dict[frozenset[str], floa
         if found is not None and tried[key] > ARRIVED:
             return found
     return None
+
+
+def _elsewhere(data: Data, now: Move) -> Iterator[Move]:
+    """Fits of the same effects with one of them at another step or instant, or in its other form."""
+    for pair in REACHED:
+        if pair[0] in now.effects:
+            yield stands(refit(data, at_best(data, now.fit, pair), now.fit.starts, now.effects), now.effects)
+    for pair in TWO_FORMS:
+        found = _in_other_form(data, now, pair) if pair[0] in now.effects else None
+        if found is not None:
+            yield found
 
 
 def _in_other_form(data: Data, now: Move, pair: tuple[str, str]) -> Move | None:
