@@ -66,7 +66,7 @@ RECORDS = (
                     Parameter("instant", "s", 0.0, (0.0, 1000.0), 1.0, shape=True, instant=True)),
         channels=BOTH,
         act=Load(payload_instant, payload_change), fast=payload_lightness, timed=True,
-        search=Search((signed("loss", 0.8, below=1.0),
+        search=Search((Coordinate("loss", 0.0, -3.0, 0.8, 0.24, below=1.0),  # from a quarter of the load to five times
                        Coordinate("instant", 0.0, 0.0, 1e4, 10.0, shape=True, reach=(10.0, 1.2, 0.15))),
                       Transform(lambda c: {"ratio": 1.0 / (1.0 - c["loss"]), "instant": float(c["instant"])},
                                 lambda p: {"loss": 1.0 - 1.0 / p["ratio"], "instant": p["instant"]}),

@@ -73,6 +73,18 @@ def test_parameters_and_coordinates_lead_to_and_fro(name):
 
 
 @searched
+def test_a_search_reaches_beyond_all_that_real_robots_show(name):
+    """A fit at a bound of its search counts for nothing, so that none may lie within what the catalogue tells."""
+    typical = CATALOGUE[name].typical()
+    for parameter in CATALOGUE[name].parameters:
+        for end in () if parameter.shape else parameter.range:
+            values = from_catalogue(name, {**typical, parameter.name: end})
+            for own in COORDINATES[name]:
+                if not own.shape and values[own.name] != own.neutral:
+                    assert own.low < values[own.name] < own.high, (parameter.name, end)
+
+
+@searched
 def test_neutral_coordinates_are_neutral_parameters(name):
     neutral, search = CATALOGUE[name].neutral(), CATALOGUE[name].search
     found = to_catalogue(name, {c.name: c.neutral for c in search.coordinates})
