@@ -7,7 +7,7 @@ import pytest
 from support.diagnoses import made_up
 from support.small_robot import LAW, nominal_fit, robot_with, windows_of
 
-from jaxident.diagnosis.account.needless import _owners, needless
+from jaxident.diagnosis.account.needless import _owners, _without_laws, needless
 from jaxident.diagnosis.diagnose import worse
 from jaxident.diagnosis.discovery.fit import Bending, Curve, refit_with
 from jaxident.diagnosis.discovery.kinds import Kind
@@ -49,10 +49,17 @@ def test_an_effect_in_whose_place_the_law_acts_stays(turning):
 
 
 @pytest.mark.slow
+def test_an_effect_that_the_law_explains_far_better_goes(turning):
+    assert "input_saturation" in LAW_OF_PUSH.kind.effects
+    assert without_need(turning, ("turn_loss", "input_saturation")) == ("input_saturation",)
+
+
+@pytest.mark.slow
 def test_an_effect_owns_what_it_explains_unless_laws_bring_a_fifth_as_much(turning):
     finding = found(turning, ("turn_loss", "direction_gain"))
+    costs = _without_laws(finding.data, finding)
     for brought, owners in ((1.0, {"turn_loss", "direction_gain"}), (1e6, set())):
-        assert _owners(finding.data, finding, finding.fit.cost - brought) == owners
+        assert _owners(costs, costs.all - brought) == owners
 
 
 def test_where_wheels_are_measured_all_effects_stay():
