@@ -65,8 +65,8 @@ class Diagnosis(NamedTuple):
         suspicions: what the log says against itself, with the option that mends it, a line each.
         refused: effects that fit the runs for naming, and without which the judging runs are predicted better (95 %
             sure). The corrected model has none of them.
-        needless: effects that were named before the laws were discovered, and for which nothing speaks beside these.
-            The corrected model has none of them, either.
+        needless: effects that were named before the laws were discovered, and in whose place these stand. The corrected
+            model has none of them, either.
         odometry: the judging stretches as the wheels tell them; None without wheel speeds.
     """
 

@@ -40,7 +40,7 @@ def refusal(found: Diagnosis) -> str:
 
 def needless(found: Diagnosis) -> str:
     """Effects that discovered laws make needless, in a sentence; nothing where there are none."""
-    why = "named at first. Beside what was discovered nothing speaks for {it}, and"
+    why = "named at first. What was discovered stands in {its} place, and"
     return _without(found.needless, ("was", "were"), why)
 
 
@@ -49,8 +49,8 @@ def _without(effects: tuple[str, ...], verbs: tuple[str, str], why: str) -> str:
     if not effects:
         return ""
     names, number = together(effects), int(len(effects) > 1)
-    it = ("it", "them")[number]
-    begin = f"{names[0].upper()}{names[1:]} {verbs[number]} {why.format(it=it)}"
+    it, its = (("it", "its"), ("them", "their"))[number]
+    begin = f"{names[0].upper()}{names[1:]} {verbs[number]} {why.format(it=it, its=its)}"
     return f"{begin} the corrected model has not got {it}."
 
 

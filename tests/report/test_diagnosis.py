@@ -340,7 +340,7 @@ def test_what_the_judging_runs_refuse_is_told_in_a_sentence():
 def test_names_that_laws_make_needless_are_told_in_a_sentence():
     assert "named at first" not in lead(made_up("partly"))
     told = lead(made_up("unknown")._replace(needless=("traction_limit",)))
-    assert "Traction limit was named at first. Beside what was discovered nothing speaks for it" in told
+    assert "Traction limit was named at first. What was discovered stands in its place" in told
 
 
 def test_the_worst_stretches_are_drawn_with_both_models():
