@@ -1,5 +1,5 @@
-"""Refits that a search asks for: of the set that its table promises, and of sets with one effect exchanged, whose
-answers are not as linear as the table has them."""
+"""Refits that a search asks for: of the set that its table promises, of the same set at another step, instant or form,
+and of sets with one effect exchanged. Their answers are not as linear as the table has them."""
 
 from collections.abc import Collection, Iterator, Sequence
 from typing import NamedTuple
