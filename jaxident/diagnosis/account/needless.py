@@ -24,8 +24,7 @@ from jaxident.diagnosis.fit.refit import Data, Solution, refit
 from jaxident.effects.coordinates import NOMINAL, PLACES, neutral_vector
 
 LESS = 0.5
-"""Part of what laws bring in the place of a name. On four sealed robots a false name brought 0.01, 0.38, 0.43 and 0.44 of
-it."""
+"""Part of what laws bring in the place of a name. On four sealed robots a false name brought 0.01, 0.38, 0.43, 0.44."""
 
 
 class Costs(NamedTuple):
