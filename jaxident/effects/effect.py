@@ -53,7 +53,6 @@ ALONG, LATERAL, HEADING = "along", "lateral", "heading"
 BOTH = (ALONG, HEADING)
 EVERYWHERE = (ALONG, LATERAL, HEADING)
 
-
 EDGE = 0.2
 """Part of a session, at its begin and at its end, in which no change at an instant is looked for: few windows tell it,
 and it foretells all that follows. On half a log of a Create, a load that changed 19 s before the end of 443 s took the
