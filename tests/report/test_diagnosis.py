@@ -256,7 +256,6 @@ def test_words():
     assert plain_spaces(measured(27.1891, 0.0338, "m")) == "27.189 ± 0.034 m"
     assert plain_spaces(measured(-7e-5, 1.4e-4)) == "−0.00007 ± 0.00014"
     assert parameters("payload_change", {"ratio": 1.00388}) == "ratio 1.0039"
-
     assert [plain_spaces(chance(p)) for p in (0.0, 0.001, 0.5, 0.999, 1.0)] == [
         "0 %",
         "< 1 %",

@@ -59,7 +59,7 @@ def test_an_effect_owns_what_it_explains_unless_laws_bring_a_fifth_as_much(turni
     finding = found(turning, ("turn_loss", "direction_gain"))
     costs = _without_laws(finding.data, finding)
     for brought, owners in ((1.0, {"turn_loss", "direction_gain"}), (1e6, set())):
-        assert _owners(costs, costs.all - brought) == owners
+        assert _owners(costs, costs.together - brought) == owners
 
 
 def test_where_wheels_are_measured_all_effects_stay():
