@@ -19,7 +19,7 @@ from jaxident.diagnosis.causes.evidence import evidence_of
 from jaxident.diagnosis.causes.finding import Finding
 from jaxident.diagnosis.causes.search_rounds import SURE
 from jaxident.diagnosis.causes.settled import whiten
-from jaxident.diagnosis.discovery.fit import Bending, Curve, refit_with
+from jaxident.diagnosis.discovery.fit import Bending, refit_with
 from jaxident.diagnosis.fit.refit import Data, Solution, refit
 from jaxident.effects.coordinates import NOMINAL, PLACES, neutral_vector
 
@@ -35,21 +35,23 @@ class Costs(NamedTuple):
 
 
 def needless(finding: Finding, bending: Bending) -> tuple[str, ...]:
-    """Effects of the finding that laws make needless: first those in whose place a law acts, which explains far more
-    (`_replaced`), then those that are worth less than SURE beside the laws, by refits without them, the one that
-    is worth least first. One that owns what it explains (`_owners`) stays. Where wheels are measured all stay, for
-    poses alone judge a law."""
+    """Effects of the finding that laws make needless, by refits without them. First leave those in whose place a law
+    acts, if it explains far more than they do (`_replaced`). Of the others those leave that are worth less than SURE
+    beside the laws, the one that is worth least first. An effect that owns what it explains (`_owners`) stays. Where
+    wheels are measured all stay, for poses alone judge a law."""
     windows = finding.data.windows
     if windows.wheels is not None:
         return ()
     curves, data = bending.curves, whiten(bending.fit, windows, bending.law)[0]
-    now, costs = refit_with(data, bending.fit, curves)[0], _without_laws(data, finding)
+    now, costs, gone = refit_with(data, bending.fit, curves)[0], _without_laws(data, finding), []
+    doubted = [name for name in finding.selected if name not in _owners(costs, now.cost)]
     alike = {name for curve in curves for name in curve.kind.effects}
-    kept = _owners(costs, now.cost)
-    gone = _replaced(data, now, curves, costs, [name for name in finding.selected if name in alike - kept])
-    for name in gone:
-        now = refit_with(data, _without(now, name), curves)[0]
-    names, count = [name for name in finding.selected if name not in kept | alike], len(finding.selected) - len(gone)
+    for name in (name for name in doubted if name in alike):
+        fit = refit_with(data, _without(now, name), curves)[0]
+        if _replaced(costs, name, fit.cost):
+            now = fit
+            gone.append(name)
+    names, count = [name for name in doubted if name not in alike], len(finding.selected) - len(gone)
     while names:
         fits = {name: refit_with(data, _without(now, name), curves)[0] for name in names}
         worth = {name: evidence_of(now, count) - evidence_of(fit, count - 1) for name, fit in fits.items()}
@@ -79,15 +81,11 @@ def _owners(costs: Costs, with_laws: float) -> set[str]:
     return {name for name, other in costs.without.items() if laws < UNEXPLAINED * (other - costs.together + laws)}
 
 
-def _replaced(data: Data, now: Solution, curves: tuple[Curve, ...], costs: Costs, names: list[str]) -> list[str]:
-    """Names that bring by themselves less than LESS of what the laws bring in their place."""
-    found = []
-    for name in names:
-        without = costs.without[name]
-        laws = without - refit_with(data, _without(now, name), curves)[0].cost
-        if without - costs.together < LESS * laws:
-            found.append(name)
-    return found
+def _replaced(costs: Costs, name: str, with_laws: float) -> bool:
+    """Whether a name brings by itself less than LESS of what the laws bring in its place. with_laws: the cost of these
+    without it."""
+    without = costs.without[name]
+    return without - costs.together < LESS * (without - with_laws)
 
 
 def _without(fit: Solution, name: str) -> Solution:
