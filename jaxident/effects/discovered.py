@@ -4,96 +4,51 @@ of the chain.
     what it adds = times * curve(signal), or times * surface(signal, second signal)
 
 A curve is straight between its knots and constant beyond them; so is a surface along each of its signals. times is 1,
-the speed v, the turn rate w, the cosine or sine of the heading, or of each wheel its push or how far its command has
-just changed. A robot that loses speed in turns has v times a curve of w; one that is slow on a patch of carpet has v
-times a surface of x and y; a floor that slopes differently from place to place makes two surfaces, one for each
-direction; a robot that follows the later, the faster it is has the change of each wheel's command times a curve of v.
+the speed v, the turn rate w, the cosine or sine of the heading, or of each wheel its speed, its push or how far its
+command has just changed. A robot that loses speed in turns has v times a curve of w; one that is slow on a patch of
+carpet has v times a surface of x and y; a floor that slopes differently from place to place makes two surfaces, one for
+each direction; a robot that follows the later, the faster it is has the change of each wheel's command times a curve of
+v; a wheel that is not round rolls by its speed times a curve of its angle, which is another one when each run begins.
 Both integrators take laws from their settings (`with_laws`), under one name that no effect of the catalogue has.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
-import numpy as np
 
 from jaxident.array_types import Array, Pose, Wheels
+from jaxident.effects.law_arrays import Laws
 from jaxident.effects.law_kinds import (
     ACTS,
     ALONG,
+    ANGLE,
     BY_CAMERA,
     DISCOVERED,
     HEADING,
-    MOST_KNOTS,
-    MOST_LAWS,
-    MOST_SURFACE_KNOTS,
+    PUSHES,
+    ROLLINGS,
     SIDEWAYS,
     SIGNALS,
     TIMES,
     WHEELS,
     remembered,
-    scaled,
 )
 from jaxident.effects.signals import Motion
 from jaxident.numerics import sin_cos, wrap
 from jaxident.robot.drive import Force, Physical, force, wheel_speeds
-from jaxident.robot.model import Discovered
-
-
-class Laws(NamedTuple):
-    """Some laws as arrays: places in ACTS, TIMES and SIGNALS (laws,), knots (laws, knots) and (laws, second knots), and
-    values there (laws, knots, second knots). Without surfaces there is one second knot; a curve beside a surface has
-    the same values at all of them."""
-
-    act: Any
-    times: Any
-    signal: Any
-    second: Any
-    at: Any
-    second_at: Any
-    value: Any
 
 
 class Here(NamedTuple):
-    """What is held over a substep: position [m], session time [s], what drives the wheels [unit], and what the commands
-    left behind (`Past`), None without laws."""
+    """What is held over a substep: position [m], session time [s], what drives the wheels [unit]; what the commands
+    left behind (`Past`), and the angles of the wheels that laws go by (laws, ...) [rad], None without laws."""
 
     x: Any
     y: Any
     time: Any
     push: Wheels
     past: Any
-
-
-IDLE = Discovered(ALONG, "1", "v", np.arange(2.0), np.zeros(2))
-"""A law that does nothing: that of a robot without any in a program that runs laws."""
-
-
-def laws_of(laws: Sequence[Discovered], largest: float = 1.0, surfaces: bool | None = None) -> Laws | None:
-    """Laws as arrays, for commands over `largest`, filled up with some that do nothing; None of none. surfaces: whether
-    there is room for surfaces; by default, whether one of the laws is one."""
-    if not laws:
-        return None
-    laws = [*(scaled(law, 1.0 / largest) for law in laws), *[IDLE] * (MOST_LAWS - len(laws))]
-    wide = any(law.second_signal for law in laws) if surfaces is None else surfaces
-    names = list(SIGNALS)
-    codes = [(list(ACTS).index(law.acts_on), list(TIMES).index(law.times), names.index(law.signal),
-              names.index(law.second_signal or law.signal)) for law in laws]  # fmt: skip
-    rows = [_padded(law, MOST_SURFACE_KNOTS if wide else 1) for law in laws]
-    return Laws(*np.array(codes).T, *(np.stack(column) for column in zip(*rows, strict=True)))
-
-
-def _padded(law: Discovered, second: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """MOST_KNOTS knots, so many second knots, and values (knots, second knots), the last repeated beyond the last."""
-    at, second_at = np.asarray(law.at), np.arange(1.0) if law.second_at is None else np.asarray(law.second_at)
-    value = np.asarray(law.value).reshape(len(at), len(second_at))
-    more = (MOST_KNOTS - len(at), second - len(second_at))
-    return _longer(at, more[0]), _longer(second_at, more[1]), np.pad(value, [(0, n) for n in more], mode="edge")
-
-
-def _longer(at: Array, more: int) -> np.ndarray:
-    """Knots with some more beyond the last."""
-    return np.concatenate([at, at[-1] + (1.0 + np.arange(more)) * (np.ptp(at) or 1.0)])
+    angles: Any
 
 
 def with_laws(settings: Mapping[str, Any], laws: Laws | None) -> Mapping[str, Any]:
@@ -101,22 +56,42 @@ def with_laws(settings: Mapping[str, Any], laws: Laws | None) -> Mapping[str, An
     return settings if laws is None else {**settings, DISCOVERED: {"laws": laws}}
 
 
+def turned(settings: Mapping[str, Any], angles: Array | None, way: Array, turn: Array) -> Array | None:
+    """The angles (laws, ...) [rad] of wheels that laws go by, after a way [m] and a turn [rad] of the robot; None
+    without laws."""
+    if angles is None:
+        return None
+    per_metre, per_radian = (_each(rate, way) for rate in jnp.moveaxis(settings[DISCOVERED]["laws"].turn, -1, 0))
+    return angles + per_metre * way + per_radian * turn
+
+
+def rolled(settings: Mapping[str, Any], drive: Physical, now: Motion, here: Here) -> Force | None:
+    """Speeds over the ground, along [m/s] and in heading [rad/s], that laws add; None without laws."""
+    if DISCOVERED not in settings:
+        return None
+    laws: Laws = settings[DISCOVERED]["laws"]
+    more = force(drive, _by_wheel(laws, ROLLINGS, drive, now, here))
+    return Force(more.along / drive.rate[0], more.heading / drive.rate[1])
+
+
 def pushed(settings: Mapping[str, Any], drive: Physical, now: Motion, here: Here) -> Force | None:
     """Accelerations that laws add; None without laws."""
     if DISCOVERED not in settings:
         return None
     laws: Laws = settings[DISCOVERED]["laws"]
-    wheels = force(drive, _pushed_wheels(laws, wheel_speeds(drive, now.v, now.w), now, here))
+    wheels = force(drive, _by_wheel(laws, PUSHES, drive, now, here))
     whole = _added(laws, _shared(now, here))
     return Force(_sum(laws, ALONG, whole) + wheels.along, _sum(laws, HEADING, whole) + wheels.heading)
 
 
-def _pushed_wheels(laws: Laws, speeds: Wheels, now: Motion, here: Here) -> Wheels:
-    """What laws add to the push of each wheel."""
+def _by_wheel(laws: Laws, acts: tuple[str, ...], drive: Physical, now: Motion, here: Here) -> Wheels:
+    """What laws add to both wheels: each its own one of two of ACTS, and with pushes what is added to each push."""
     shared, past, whole = _shared(now, here), remembered(here.past), []
-    for number, (n, m) in enumerate(zip(speeds, here.push, strict=True)):
+    speeds = wheel_speeds(drive, now.v, now.w)
+    for number, (act, n, m) in enumerate(zip(acts, speeds, here.push, strict=True)):
         known = shared | {"own speed": n, "own push": m} | {name: part[number] for name, part in past.items()}
-        whole.append(_sum(laws, WHEELS, _added(laws, known)))
+        added = _added(laws, known | {ANGLE: wrap(here.angles)})
+        whole.append(_sum(laws, act, added) + (_sum(laws, WHEELS, added) if acts == PUSHES else 0.0))
     return Wheels(*whole)
 
 
@@ -165,9 +140,15 @@ def _added(laws: Laws, known: Mapping[str, Array]) -> Array:
 
 
 def _chosen(places: Array, names: Collection[str], known: Mapping[str, Array]) -> Array:
-    """What is known (laws, ...) by the names at some places (laws,), 0 where nothing is."""
-    shape = jnp.broadcast_shapes(*(jnp.shape(value) for value in known.values()))
-    return jnp.stack([jnp.broadcast_to(known.get(name, 0.0), shape) for name in names])[places]
+    """What is known (laws, ...) by the names at some places (laws,), 0 where nothing is; of angles each law has its
+    own."""
+    own = {name: value for name, value in known.items() if name != ANGLE}
+    shape = jnp.broadcast_shapes(*(jnp.shape(value) for value in own.values()))
+    chosen = jnp.stack([jnp.broadcast_to(own.get(name, 0.0), shape) for name in names])[places]
+    if ANGLE not in known or ANGLE not in names:
+        return chosen
+    by_angle = _each(places == list(names).index(ANGLE), chosen[0])
+    return jnp.where(by_angle, known[ANGLE], chosen)
 
 
 def _curve(laws: Laws, signal: Array) -> Array:

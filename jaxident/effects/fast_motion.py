@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 
 from jaxident.array_types import Array, Pose, State, Wheels
-from jaxident.effects.discovered import Here, pushed, shifted, sideways
+from jaxident.effects.discovered import Here, pushed, rolled, shifted, sideways, turned
 from jaxident.effects.fast_input import SUBSTEPS
 from jaxident.effects.friction import slide
 from jaxident.effects.signals import Motion
@@ -26,6 +26,14 @@ class Lag(NamedTuple):
 
     half: Any
     whole: Any
+
+
+class Rolling(NamedTuple):
+    """How both wheels turn beside the robot's own motion: by how much faster than the ground, for each effect that lets
+    them slide; and the angles of those that discovered laws go by (laws, ...) [rad], None without laws."""
+
+    excess: list[Array]
+    angles: Any = None
 
 
 class Row(NamedTuple):
@@ -57,13 +65,13 @@ def report(settings, x: Array, y: Array, theta: Array) -> Pose:
     return shifted(settings, seen(settings, true, fast=True), true)
 
 
-def rolling(like: Array) -> list[Array]:
-    """By how much wheels that roll turn faster than the ground: both wheels, for each effect that lets them slide."""
-    return [jnp.zeros_like(like)] * (2 * len(CHAIN["grip"]))
+def rolling(like: Array, angles: Array | None = None) -> Rolling:
+    """Of wheels that do not slide, at some angles."""
+    return Rolling([jnp.zeros_like(like)] * (2 * len(CHAIN["grip"])), angles)
 
 
-def advance_row(settings, drive: Physical, state: State, excess: list[Array], row: Row, slip=(0.0, 0.0)):
-    """The state one row later, and by how much each wheel then turns faster than the ground (`excess`: it did).
+def advance_row(settings, drive: Physical, state: State, wheels: Rolling, row: Row, slip=(0.0, 0.0)):
+    """The state one row later, and how the wheels roll then (`wheels`: they did).
 
     slip: a random acceleration along [m/s^2] and in heading [rad/s^2], held over the row, that asks nothing of the
     wheels' grip."""
@@ -72,17 +80,18 @@ def advance_row(settings, drive: Physical, state: State, excess: list[Array], ro
         loads = [effect.law(middle, row.part, **values) for effect, values in acting("load", settings)]
         lightness = functools.reduce(operator.mul, loads)
         push = _force(drive, row.mean[number]), _force(drive, row.slope[number])
-        here = Here(state.x, state.y, middle, Wheels(*row.mean[number]), row.past)
-        state, excess = _substep(settings, drive, state, excess, push, slip, row.part, row.lags, lightness, here)
-    return state, excess
+        angles = turned(settings, wheels.angles, 0.5 * row.part * state.v, 0.5 * row.part * state.w)
+        here = Here(state.x, state.y, middle, Wheels(*row.mean[number]), row.past, angles)
+        state, wheels = _substep(settings, drive, state, wheels, push, slip, row.part, row.lags, lightness, here)
+    return state, wheels
 
 
 def _substep(
-    settings, drive: Physical, state: State, excess, push, slip, part: Array, lags, lightness: Array, here: Here
+    settings, drive: Physical, state: State, wheels, push, slip, part: Array, lags, lightness: Array, here: Here
 ):
-    """The state one substep later, and by how much the wheels then turn faster than the ground; `excess`: they did.
-    here: what discovered laws may depend on besides the motion."""
-    x, y, theta, v, w = state
+    """The state one substep later, and how the wheels roll then; `wheels`: they did. here: what discovered laws may
+    depend on besides the motion."""
+    (x, y, theta, v, w), excess = state, wheels.excess
     (pull, ramp), (lag_v, lag_w) = push, lags
     asked = _asked(drive, v, w, pull, ramp, -0.5)
     sliding = _sliding(settings, excess, asked, asked, part)
@@ -98,15 +107,22 @@ def _substep(
     pull = [f - lightness * g for f, g in zip(pull, rub, strict=True)]
     middle = _ahead(state, lag_v.half, lag_w.half, pull, 0.5 * part, None)
     end = _ahead(state, lag_v.whole, lag_w.whole, pull, part, ramp)
-    x_rate, y_rate = 0.0, 0.0
-    for weight, (angle, speed, turning) in ((1.0, (theta, v, w)), (4.0, middle), (1.0, end)):
+    faster = rolled(settings, drive, Motion(middle[1], middle[2], middle[0]), here)
+    x_rate, y_rate, way, heading = 0.0, 0.0, 0.0, end[0]
+    for weight, at, now in ((1.0, 0.0, (theta, v, w)), (4.0, 0.5, middle), (1.0, 1.0, end)):
+        angle, speed, turning = now
+        if faster is not None:
+            speed, angle = speed + faster.along, angle + at * part * faster.heading
+            heading = angle
         sine, cosine = sin_cos(angle)
         left = sum(effect.law(speed, turning, **values) for effect, values in acting("side", settings))
         left = left + sideways(settings, Motion(speed, turning, angle), here)
         x_rate = x_rate + weight * (speed * cosine - left * sine)
         y_rate = y_rate + weight * (speed * sine + left * cosine)
-    moved = State(x + part / 6.0 * x_rate, y + part / 6.0 * y_rate, *end)
-    return moved, [own.excess for wheels in sliding for own in wheels]
+        way = way + part / 6.0 * weight * speed
+    moved = State(x + part / 6.0 * x_rate, y + part / 6.0 * y_rate, heading, *end[1:])
+    angles = turned(settings, wheels.angles, way, heading - theta)
+    return moved, Rolling([own.excess for pair in sliding for own in pair], angles)
 
 
 def _force(drive: Physical, m) -> list[Array]:

@@ -8,14 +8,16 @@ import jax.numpy as jnp
 
 from jaxident.array_types import Array, Pose, State, Wheels
 from jaxident.effects.catalogue import CATALOGUE, by_name
-from jaxident.effects.discovered import Here, Laws, shifted, with_laws
+from jaxident.effects.discovered import Here, shifted, turned, with_laws
 from jaxident.effects.input_chain import at_rest, push
 from jaxident.effects.intervals import Grid, make_grid
+from jaxident.effects.law_arrays import Laws
 from jaxident.effects.law_kinds import DISCOVERED
 from jaxident.effects.past import Past, past_of
 from jaxident.effects.signals import Motion
 from jaxident.effects.stages import CORNERED, MOVING, acting, holds, seen
 from jaxident.effects.substep import after_half, move, solve_half
+from jaxident.numerics import sin_cos
 from jaxident.robot.drive import Force, Physical, advance, force, hold, wheel_speeds
 from jaxident.robot.noise import Noise, draw_noise, draw_white, observe, slip
 
@@ -112,8 +114,16 @@ def run_states(
     past = None
     if laws is not None:
         past = jax.tree.map(lambda leaf: leaf[grid.row], past_of(jnp.asarray(t), jnp.stack(command, axis=-1)))
-    found = _scan(settings, drive, dead_zone, grid, push_aside, past, start, session_time - t[0])
+    angles = _first_angles(laws, key)
+    found = _scan(settings, drive, dead_zone, grid, push_aside, past, angles, start, session_time - t[0])
     return jax.tree.map(lambda column: column[grid.at_row], found)
+
+
+def _first_angles(laws: Laws | None, key: Array | None) -> Array | None:
+    """The angles (laws,) [rad] at which wheels begin that laws go by: drawn, or without a key 0; None without laws."""
+    if laws is None or key is None:
+        return None if laws is None else jnp.zeros(len(laws.turn))
+    return jax.random.uniform(jax.random.fold_in(key, 2), (len(laws.turn),), maxval=2.0 * jnp.pi)
 
 
 def disturb(pose: Pose, vector: Array, t: Array, *, noise: Noise | None, key: Array, parts: frozenset[str]) -> Pose:
@@ -165,16 +175,16 @@ def _moves(settings: Settings) -> bool:
     return bool(settings.keys() & MOVING) or DISCOVERED in settings
 
 
-def _scan(settings, drive, dead_zone, grid: Grid, slips: Force | None, past: Past | None, start: State, offset: Array):
+def _scan(settings, drive, dead_zone, grid: Grid, slips: Force | None, past: Past | None, angles, start, offset: Array):
     """True states (points,) at the points of the grid, and by how much each wheel then turns faster than the ground;
-    `offset` takes times of the log to session times."""
+    `angles`: at which wheels begin that laws go by; `offset` takes times of the log to session times."""
     moving = _moves(settings)
     solve = solve_half if moving else hold
     solved = jax.tree.map(grid.spread, solve(drive, grid.step))
     length = grid.spread(grid.step)
 
     def interval(carry, now):
-        state, memory, excess = carry
+        state, memory, excess, angles = carry
         begin, h, target, shove, changed, solution, behind = now
 
         def speeds(pushed: Wheels) -> Wheels:
@@ -183,14 +193,18 @@ def _scan(settings, drive, dead_zone, grid: Grid, slips: Force | None, past: Pas
 
         pushed, memory = push(settings, dead_zone, memory, target, begin, h, speeds)
         if moving:
-            here = Here(state.x, state.y, begin + 0.5 * h, pushed.mean, behind)
+            midway = turned(settings, angles, 0.5 * h * state.v, 0.5 * h * state.w)
+            here = Here(state.x, state.y, begin + 0.5 * h, pushed.mean, behind, midway)
             after, excess = move(settings, drive, state, excess, pushed, shove, changed, solution, h, here)
         else:
             pull = force(drive, pushed.mean)
             if shove is not None:
                 pull = Force(pull.along + shove.along, pull.heading + shove.heading)
             after = advance(state, pull, solution)
-        return (after, memory, excess), (state, together(excess))
+        sine, cosine = sin_cos(0.5 * (state.theta + after.theta))
+        way = (after.x - state.x) * cosine + (after.y - state.y) * sine
+        angles = turned(settings, angles, way, after.theta - state.theta)
+        return (after, memory, excess, angles), (state, together(excess))
 
     def together(excess: tuple[Wheels, ...]) -> Wheels:
         return jax.tree.map(lambda *each: sum(each), Wheels(like, like), *excess)
@@ -199,5 +213,5 @@ def _scan(settings, drive, dead_zone, grid: Grid, slips: Force | None, past: Pas
     begin = State(*(jnp.asarray(s, like.dtype) for s in start))
     inputs = (grid.start + offset, length, grid.command, slips, grid.changed, solved, past)
     rolling = tuple(Wheels(like, like) for _ in acting("grip", settings))
-    (last, _, excess), found = jax.lax.scan(interval, (begin, at_rest(settings, like), rolling), inputs)
+    (last, _, excess, _), found = jax.lax.scan(interval, (begin, at_rest(settings, like), rolling, angles), inputs)
     return jax.tree.map(jnp.append, found, (last, together(excess)))

@@ -25,14 +25,19 @@ through one compiled program, every set with a surface through another."""
 ACTS = {
     "acceleration along": "m/s^2", "acceleration in heading": "rad/s^2", "speed sideways": "m/s",
     "push of each wheel": UNIT, "pose ahead": "m", "pose to the left": "m", "reported heading": "rad",
+    "push of the right wheel": UNIT, "push of the left wheel": UNIT, "rolling of the right wheel": UNIT,
+    "rolling of the left wheel": UNIT,
 }  # fmt: skip
-"""What a law may add to, and the unit."""
-ALONG, HEADING, SIDEWAYS, WHEELS, AHEAD, LEFT, TURN = ACTS
-BY_CAMERA = (AHEAD, LEFT, TURN)
+"""What a law may add to, and the unit. rolling: the wheel's speed over the ground, as the command that holds it."""
+ALONG, HEADING, SIDEWAYS, WHEELS, AHEAD, LEFT, TURN, *OF_ONE_WHEEL = ACTS
+BY_CAMERA, PUSHES, ROLLINGS = (AHEAD, LEFT, TURN), tuple(OF_ONE_WHEEL[:2]), tuple(OF_ONE_WHEEL[2:])
+ANGLE = "own angle"
+"""The signal of a law for one wheel: this wheel's angle. What it was when a run began, nobody knows: it is found in the
+first poses of the run."""
 SIGNALS = {
     "v": "m/s", "w": "rad/s", "heading": "rad", "x": "m", "y": "m", "time": "s", "push right": UNIT,
     "push left": UNIT, "since reversal": "s", "own speed": UNIT, "own push": UNIT, **dict.fromkeys(HEATS, SQUARE),
-    **dict.fromkeys(CHANGES, UNIT),
+    **dict.fromkeys(CHANGES, UNIT), ANGLE: "rad",
 }  # fmt: skip
 """What a curve may depend on, and the unit. time: session time. since reversal: since the commands' sum last changed
 its sign (`past`). own: of the wheel that is pushed; its speed is in the commands that hold it, its heat a mean of its
@@ -43,11 +48,13 @@ SIGNAL_WORDS = {
     "own speed": "speed of that wheel", "own push": "push of that wheel", "since reversal": "time since a reversal",
     **{name: f"mean square of that wheel's command over {tau:g} s" for name, tau in HEATS.items()},
     **{name: f"change of that wheel's command over {tau:g} s" for name, tau in CHANGES.items()},
+    ANGLE: "angle of that wheel",
 }  # fmt: skip
 """Each signal in words."""
 OF_CAMERA = ("heading", "x", "y")
 """Signals that a camera's error may depend on."""
 TIMES = {"1": "", "v": "m/s", "w": "rad/s", "cos heading": "", "sin heading": "", "own push": UNIT,
+         "own speed": UNIT,
          **dict.fromkeys(CHANGES, UNIT)}  # fmt: skip
 """What a curve may be multiplied with, and the unit."""
 
@@ -99,10 +106,20 @@ def _check_kind(law: Discovered) -> None:
     by_camera, own = law.acts_on in BY_CAMERA, any(name.startswith("own ") for name in (*signals, law.times))
     if by_camera and (not signals <= set(OF_CAMERA) or law.times != "1"):
         raise InputError(f"discovered: an error of the camera is 1 times a curve of {' or '.join(OF_CAMERA)}")
-    if own != (law.acts_on == WHEELS):
+    if own != (law.acts_on == WHEELS or law.acts_on in OF_ONE_WHEEL):
         raise InputError("discovered: a push of each wheel is, or is times, a curve of what is the wheel's own")
     if law.signal == law.second_signal:
         raise InputError(f"discovered: a surface of {law.signal} and {law.signal}; two signals are needed")
+    _check_angle(law)
+
+
+def _check_angle(law: Discovered) -> None:
+    by_angle = ANGLE in (law.signal, law.second_signal)
+    if by_angle != (law.acts_on in OF_ONE_WHEEL) or (by_angle and law.second_signal):
+        raise InputError(f"discovered: a law for one wheel is a curve of its {ANGLE}, and no other law is")
+    numbers = [number for number in (law.period, law.half_track) if number is not None]
+    if len(numbers) != 2 * by_angle or not np.all(np.isfinite(numbers)) or (by_angle and law.period <= 0.0):
+        raise InputError(f"discovered: a curve of the {ANGLE}, and no other, has a period above 0 and a half_track")
 
 
 def scaled(law: Discovered, factor: float) -> Discovered:

@@ -8,8 +8,8 @@ import numpy as np
 from jaxident.array_types import AT_REST, Array, Pose, State, Wheels
 from jaxident.effects.catalogue import CATALOGUE, to_vector
 from jaxident.effects.checks import check_delay, check_effects
-from jaxident.effects.discovered import laws_of
 from jaxident.effects.full import run_full, run_states, substeps_for
+from jaxident.effects.law_arrays import laws_of
 from jaxident.effects.law_kinds import check_discovered
 from jaxident.log import Log
 from jaxident.robot import simulate as nominal
@@ -31,8 +31,8 @@ def simulate(
         log: commands and times of one run, all arrays (samples,). Steps may differ, unless the model is one of free
             numerators.
         start: state at the first row.
-        key: of slip, camera noise, wheel noise and random effects. Without a key there is no noise, and random effects
-            do not act.
+        key: of slip, camera noise, wheel noise, random effects, and the angles at which wheels begin that a discovered
+            law goes by. Without a key there is no noise, random effects do not act, and wheels begin at 0.
         session_time: time of the first row in the robot's session [s], for effects that drift.
 
     Returns:

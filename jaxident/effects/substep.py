@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array, State, Wheels
-from jaxident.effects.discovered import Here, pushed, sideways
+from jaxident.effects.discovered import Here, pushed, rolled, sideways
 from jaxident.effects.friction import dry_friction
 from jaxident.effects.law_kinds import DISCOVERED
 from jaxident.effects.signals import Motion, Push
@@ -167,11 +167,16 @@ def _arrive(settings, drive: Physical, state: State, held: Force, path, half: Ha
         end = _sum(end, (1.0, d))
         rates = [Force(rates[0].along + first.v, rates[0].heading + first.w),
                  Force(rates[1].along + last.v, rates[1].heading + last.w)]  # fmt: skip
+    v, w = end.v, end.w
+    faster = rolled(settings, drive, middle, here)
+    if faster is not None:
+        start, middle, end = (_sum(now, (1.0, Motion(faster.along, faster.heading, part * h * faster.heading)))
+                              for now, part in ((start, 0.0), (middle, 0.5), (end, 1.0)))  # fmt: skip
     (x0, y0), (x1, y1), (x2, y2) = (_velocity(settings, now, here) for now in (start, middle, end))
     (a0, b0), (a2, b2) = (_velocity_rate(settings, *pair, here) for pair in zip((start, end), rates, strict=True))
     x = state.x + h * ((7.0 * (x0 + x2) + 16.0 * x1) / 30.0 + h / 60.0 * (a0 - a2))
     y = state.y + h * ((7.0 * (y0 + y2) + 16.0 * y1) / 30.0 + h / 60.0 * (b0 - b2))
-    return State(x, y, end.theta, end.v, end.w)
+    return State(x, y, end.theta, v, w)
 
 
 def _velocity(settings, now: Motion, here: Here) -> tuple[Array, Array]:

@@ -90,6 +90,8 @@ def law_to_dict(shown: Shown) -> dict[str, Any]:
         "times": law.times,
         "inputs": [*knots_by_signal(law), *([] if law.times == "1" else [law.times])],
         "memory": MEMORIES.get(law.signal, MEMORIES.get(law.times)),
+        "period": law.period,
+        "half_track": law.half_track,
         "curve": [dict(zip(keys, point, strict=True)) for point in points],
         "rows": list(shown.density),
         "share": shown.share,

@@ -140,6 +140,8 @@ def write_effect(effect: Effect) -> dict[str, Any]:
 
 SECOND = ("second_signal", "second_at")
 """Keys of a law that is a surface."""
+TURNING = ("period", "half_track")
+"""Keys of a law that goes by the angle of a wheel."""
 
 
 def read_discovered(value: Any, where: str) -> tuple[Discovered, ...]:
@@ -153,7 +155,8 @@ def read_discovered(value: Any, where: str) -> tuple[Discovered, ...]:
 
 
 def _read_law(value: Any, where: str) -> Discovered:
-    found = take_keys(value, where, ("acts_on", "signal", "at", "value"), ("times", "standard_deviation", *SECOND))
+    more = ("times", "standard_deviation", *SECOND, *TURNING)
+    found = take_keys(value, where, ("acts_on", "signal", "at", "value"), more)
     words = {key: take_text(found[key] or "1", f"{where}.{key}") for key in ("acts_on", "times", "signal")}
     keys, second = ["at"], ""
     if any(found[key] is not None for key in SECOND):
@@ -163,8 +166,9 @@ def _read_law(value: Any, where: str) -> Discovered:
     values, spread = take_array(found["value"], f"{where}.value", shape), found["standard_deviation"]
     if spread is not None:
         spread = take_array(spread, f"{where}.standard_deviation", shape, least=0.0, gaps=True)
+    period, half_track = (or_none(take_number, found[key], f"{where}.{key}") for key in TURNING)
     return Discovered(**words, at=knots[0], value=values, standard_deviation=spread, second_signal=second,
-                      second_at=knots[1] if second else None)  # fmt: skip
+                      second_at=knots[1] if second else None, period=period, half_track=half_track)  # fmt: skip
 
 
 def write_discovered(law: Discovered) -> dict[str, Any]:
@@ -172,7 +176,8 @@ def write_discovered(law: Discovered) -> dict[str, Any]:
     words = {"acts_on": law.acts_on, "times": law.times, "signal": law.signal}
     curve = {"at": to_lists(law.at), "value": to_lists(law.value)}
     second = {"second_signal": law.second_signal, "second_at": to_lists(law.second_at)} if law.second_signal else {}
-    return {**words, **curve, **second, "standard_deviation": write_deviations(law.standard_deviation)}
+    turning = {key: float(getattr(law, key)) for key in TURNING if getattr(law, key) is not None}
+    return {**words, **curve, **second, **turning, "standard_deviation": write_deviations(law.standard_deviation)}
 
 
 def read_spread(value: Any, where: str) -> Spread:

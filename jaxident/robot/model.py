@@ -71,7 +71,9 @@ class Discovered:
 
     at, value (knots,): the curve, straight between the knots and constant beyond; standard_deviation (knots,) of its
     values, or None. A surface has a second_signal, second_at (second knots,), and values and deviations (knots, second
-    knots).
+    knots). A law that goes by the angle of a wheel has the period [m], the wheel's way from turn to turn, and
+    half_track [m], the wheel's place to the right of the middle: angle = 2 pi (way + half_track heading) / period,
+    beside an angle at the beginning that is another one in each run.
     """
 
     acts_on: str = dataclasses.field(metadata={"static": True})
@@ -82,6 +84,8 @@ class Discovered:
     standard_deviation: Any = None
     second_signal: str = dataclasses.field(default="", metadata={"static": True})
     second_at: Any = None
+    period: Any = None
+    half_track: Any = None
 
 
 @jax.tree_util.register_dataclass

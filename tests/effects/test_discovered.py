@@ -2,6 +2,7 @@
 
 import dataclasses
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -10,7 +11,8 @@ import jaxident as ji
 from jaxident.array_types import AT_REST, Pose
 from jaxident.diagnosis.discovery.kinds import KINDS
 from jaxident.effects.catalogue import BY_KIND
-from jaxident.effects.discovered import laws_of, shifted, with_laws
+from jaxident.effects.discovered import shifted, with_laws
+from jaxident.effects.law_arrays import laws_of
 from jaxident.effects.law_kinds import ACTS, MOST_KNOTS, MOST_LAWS, MOST_SURFACE_KNOTS, check_discovered
 from jaxident.effects.past import past_of
 from jaxident.errors import InputError
@@ -26,6 +28,8 @@ STEP, ROWS = 0.04, 200
 ROBOT = Model(STEP, Physical(np.array([3.0, 5.0]), np.array([[0.8, 0.78], [9.0, -9.2]])), np.array([0.08, 0.1]))
 TURNS, PUSHES = np.linspace(-4.0, 4.0, 9), np.linspace(-1.0, 1.0, 9)
 HEATS, SINCE = np.linspace(0.0, 0.5, 9), np.linspace(0.0, 2.0, 9)
+ROUND = np.linspace(-np.pi, np.pi, 9)
+AROUND = ("own angle", ROUND, 0.3 * np.sin(ROUND), None, "", None)
 SURFACE = np.random.default_rng(8).normal(size=(5, 5))
 
 
@@ -57,6 +61,10 @@ LAWS = (
     ("acceleration along", "v", "x", PUSHES[::2], SURFACE, None, "y", PUSHES[::2]),
     ("acceleration along", "sin heading", "x", PUSHES[::2], SURFACE, None, "y", PUSHES[::2]),
     ("speed sideways", "v", "x", PUSHES[::2], 0.1 * SURFACE, None, "y", PUSHES[::2]),
+    ("push of the right wheel", "own push", *AROUND, 0.13, 0.1),
+    ("push of the left wheel", "1", *AROUND, 0.13, -0.1),
+    ("rolling of the right wheel", "own speed", *AROUND, 0.13, 0.1),
+    ("rolling of the left wheel", "own speed", *AROUND, 0.13, -0.1),
 )
 
 
@@ -71,7 +79,7 @@ def test_a_robot_with_a_law_is_predicted_by_its_own_model_alone(law):
 
 
 def ends_apart(model: Model, log) -> float:
-    found = ji.predict(model, log, 20)
+    found = ji.predict(model, log, 20, burn_in=60)
     last = np.flatnonzero(found.step == 20)
     rows = found.start[last] + 20
     apart = [np.asarray(column)[last] - np.asarray(getattr(log, name))[rows] for name, column in (
@@ -153,6 +161,25 @@ def test_the_file_of_a_model_with_a_surface_reads_back(tmp_path):
         np.testing.assert_array_equal(one, other)
 
 
+def test_no_prediction_is_beyond_the_angles_of_a_wheel():
+    log, starts, pose = driven_ahead()
+    assert beyond_range(with_law(*LAWS[-1]), log, starts, pose, 0.0) == []
+
+
+def test_a_wheel_begins_at_the_angle_that_it_had_there():
+    """Poses before a start tell the angle: a free run from far within a run ends near the robot, though nobody says how
+    far the wheel had turned."""
+    robot = dataclasses.replace(with_law(*LAWS[-3]), noise=ji.Noise(position=2e-4, heading=1e-3))
+    late = ji.simulate(robot, drive(), key=jax.random.key(2)).rows(60, ROWS)
+    assert ends_apart(robot, late) < 0.05 * ends_apart(ROBOT, late)
+
+
+def test_the_file_of_a_law_of_a_wheel_reads_back(tmp_path):
+    ji.save_model(with_law(*LAWS[-1]), tmp_path / "model.json")
+    (back,) = ji.load_model(tmp_path / "model.json").discovered
+    assert (back.signal, back.period, back.half_track) == ("own angle", 0.13, -0.1)
+
+
 def test_the_file_of_a_model_with_a_law_reads_back(tmp_path):
     law = Discovered("speed sideways", "v", "w", TURNS, 0.05 * TURNS, 0.01 * np.ones(9))
     ji.save_model(dataclasses.replace(ROBOT, discovered=(law,)), tmp_path / "model.json")
@@ -163,6 +190,7 @@ def test_the_file_of_a_model_with_a_law_reads_back(tmp_path):
 
 
 GOOD = {"acts_on": "acceleration along", "times": "1", "signal": "v", "at": TURNS, "value": TURNS}
+OF_A_WHEEL = {"acts_on": "push of the left wheel", "signal": "own angle", "period": 0.1, "half_track": 0.1}
 BAD = (
     ({"acts_on": "acceleration up"}, "acts_on is 'acceleration up'"),
     ({"signal": "weather"}, "signal is 'weather'"),
@@ -180,6 +208,12 @@ BAD = (
     ({"acts_on": "push of each wheel"}, "push of each wheel"),
     ({"signal": "own push"}, "push of each wheel"),
     ({"times": "own push"}, "push of each wheel"),
+    ({"signal": "own angle", "period": 0.1, "half_track": 0.1}, "push of each wheel"),
+    ({"period": 0.1, "half_track": 0.1}, "has a period above 0 and a half_track"),
+    (OF_A_WHEEL | {"signal": "own speed"}, "for one wheel is a curve of its own angle"),
+    (OF_A_WHEEL | {"half_track": None}, "has a period above 0 and a half_track"),
+    (OF_A_WHEEL | {"period": 0.0}, "has a period above 0"),
+    (OF_A_WHEEL | {"second_signal": "own push", "second_at": TURNS[:3], "value": np.zeros((9, 3))}, "for one wheel"),
 )
 
 
@@ -235,7 +269,7 @@ def test_predictions_beyond_what_a_surface_has_seen_along_its_second_signal_are_
         assert [f"m of x and {low:.3g} to {end:.3g} m of y in which" in line for line in lines] == [True] * left
 
 
-@pytest.mark.parametrize("law", LAWS, ids=lambda law: " by ".join([law[0], law[2], *law[6:7]]))
+@pytest.mark.parametrize("law", LAWS[:-4], ids=lambda law: " by ".join([law[0], law[2], *law[6:7]]))
 def test_predictions_beyond_what_a_law_has_seen_are_told(law):
     """A curve that ends within the robot's range is left by some free runs, one that spans it by none."""
     log, starts, pose = driven_ahead()

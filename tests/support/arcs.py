@@ -19,4 +19,5 @@ def along_arcs(rows: int, count: int, stride: int | None = None) -> Windows:
         t=np.arange(length)[:, None] * STEP, session=np.zeros(1), command=np.zeros((length, 1, 2)),
         step=np.full((rows, count), STEP), pose=np.stack([x, y, theta], axis=-1), seen=np.ones((rows, count), bool),
         run=np.zeros(count, int), first=np.arange(count) * stride, row=np.arange(count) * stride,
+        way=np.zeros((2, count)),
     )  # fmt: skip

@@ -15,8 +15,8 @@ from jaxident.array_types import Array, Wheels
 from jaxident.diagnosis.motion.paths import push_of
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.coordinates import BY_DRIVE, NOMINAL, PLACES, neutral_vector
-from jaxident.effects.discovered import Laws
 from jaxident.effects.fast_input import PUSHING, REMEMBERING, Push
+from jaxident.effects.law_arrays import Laws
 from jaxident.parallel import in_parallel
 from jaxident.programs import kept_program
 

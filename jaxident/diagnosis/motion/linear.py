@@ -18,8 +18,8 @@ from jaxident.diagnosis.motion.responses import answer_to_start
 from jaxident.diagnosis.motion.rims import rim_speeds
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.coordinates import limits, sizes
-from jaxident.effects.discovered import Laws
 from jaxident.effects.fast_input import Push
+from jaxident.effects.law_arrays import Laws
 from jaxident.programs import kept_program
 
 START_STATES = 5

@@ -6,9 +6,10 @@ import jax.numpy as jnp
 from jaxident.array_types import Array, Pose, State, Wheels
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.coordinates import by_effect
-from jaxident.effects.discovered import Laws, with_laws
+from jaxident.effects.discovered import with_laws
 from jaxident.effects.fast_input import SUBSTEPS, Acts, Push, pushes
 from jaxident.effects.fast_motion import Row, advance_row, drive_of, lags_of, report, rolling
+from jaxident.effects.law_arrays import Laws
 from jaxident.effects.past import Past, past_of
 from jaxident.numerics import wrap
 from jaxident.robot.drive import rim_motion
@@ -68,8 +69,16 @@ def _moved(vector: Array, starts: Array, push: Push, windows: Windows, laws: Law
     begin = time + jnp.cumsum(windows.step, axis=0) - windows.step
 
     def body(carry, row):
-        state, excess = carry
-        return advance_row(settings, drive, state, excess, row), (state, excess)
+        state, wheels = carry
+        return advance_row(settings, drive, state, wheels, row), (state, wheels.excess)
 
     rows = Row(push.mean, push.slope, part, lags_of(drive, part), begin, None if laws is None else left_behind(windows))
-    return jax.lax.scan(body, (State(*starts), rolling(starts[0])), rows)[1]
+    return jax.lax.scan(body, (State(*starts), rolling(starts[0], first_angles(laws, windows))), rows)[1]
+
+
+def first_angles(laws: Laws | None, windows: Windows) -> Array | None:
+    """The angles (laws, windows) of the wheels that laws go by in the first row of each window; None without laws."""
+    if laws is None:
+        return None
+    phase = jnp.broadcast_to(laws.phase, (len(laws.phase), windows.t.shape[1]))
+    return phase[:, windows.run] + laws.turn @ windows.way

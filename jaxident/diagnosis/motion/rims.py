@@ -15,8 +15,8 @@ from jaxident.diagnosis.motion.driving import each_of, run_each
 from jaxident.diagnosis.motion.paths import rolled
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.coordinates import POSES_ONLY, of_wheels
-from jaxident.effects.discovered import Laws
 from jaxident.effects.fast_input import Push
+from jaxident.effects.law_arrays import Laws
 from jaxident.estimation.poses.wheel_colour import samples_each
 from jaxident.programs import kept_program
 

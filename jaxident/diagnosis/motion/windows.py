@@ -7,6 +7,7 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.estimation.poses.runs import stack_runs
+from jaxident.estimation.poses.ways import ways
 from jaxident.log import Log, join, run_begins
 
 SMALLEST = 8
@@ -21,7 +22,8 @@ class Windows(NamedTuple):
     t (rows of a piece, pieces) [s]: since the piece's first row; session (pieces,) [s]: session time of that row;
     command (rows of a piece, pieces, 2). step (rows, windows) [s]: from each row to the next; pose (rows, windows, 3);
     seen (rows, windows); run (windows,): of which piece; first (windows,): its first row there; row (windows,): in
-    the log. wheels (rows, windows, 2) [rad/s], turning (rows, windows): wheel speeds, and where both were measured;
+    the log; way (2, windows): way [m] and turn [rad] of the robot from the piece's first pose to that row, as measured
+    (`ways`). wheels (rows, windows, 2) [rad/s], turning (rows, windows): wheel speeds, and where both were measured;
     None in logs without. held (4,): where the search holds the coordinates of `fit.prior.HOLDS`, NaN what it finds
     itself.
     """
@@ -35,6 +37,7 @@ class Windows(NamedTuple):
     run: Any
     first: Any
     row: Any
+    way: Any
     wheels: Any = None
     turning: Any = None
     held: Any = FREE
@@ -84,7 +87,7 @@ def cut(log: Log, rows: int, stride: int | None = None, pieces: list[Piece] | No
     return Windows(
         t=t.T, session=np.asarray(session, float), command=np.stack(stacked.command, axis=-1).transpose(1, 0, 2),
         step=step[run[:, None], inside].T, pose=pose[run[:, None], inside].transpose(1, 0, 2), seen=seen.T,
-        run=run, first=first, row=begins[run] + first, wheels=wheels, turning=turning,
+        run=run, first=first, row=begins[run] + first, way=ways(own)[:, run, first], wheels=wheels, turning=turning,
     )  # fmt: skip
 
 
@@ -109,7 +112,7 @@ def uncut(commands: Array, period: float) -> Windows:
     return Windows(
         t=t, session=np.zeros(count), command=np.asarray(commands).transpose(1, 0, 2), step=np.full(t.shape, period),
         pose=np.zeros((*t.shape, 3)), seen=np.ones(t.shape, bool), run=np.arange(count),
-        first=np.zeros(count, int), row=np.zeros(count, int),
+        first=np.zeros(count, int), row=np.zeros(count, int), way=np.zeros((2, count)),
     )  # fmt: skip
 
 
@@ -119,5 +122,5 @@ def take(windows: Windows, chosen: Array) -> Windows:
         windows = windows._replace(wheels=windows.wheels[:, chosen], turning=windows.turning[:, chosen])
     return windows._replace(
         step=windows.step[:, chosen], pose=windows.pose[:, chosen], seen=windows.seen[:, chosen],
-        run=windows.run[chosen], first=windows.first[chosen], row=windows.row[chosen],
+        run=windows.run[chosen], first=windows.first[chosen], row=windows.row[chosen], way=windows.way[:, chosen],
     )  # fmt: skip

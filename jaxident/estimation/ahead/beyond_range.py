@@ -3,7 +3,7 @@
 import numpy as np
 
 from jaxident.array_types import Array, Wheels
-from jaxident.effects.law_kinds import SIGNALS, knots_by_signal, remembered
+from jaxident.effects.law_kinds import ANGLE, SIGNALS, knots_by_signal, remembered
 from jaxident.estimation.ahead.stretches import Starts, cut_stretches
 from jaxident.log import Log
 from jaxident.numerics import wrap
@@ -18,11 +18,12 @@ beyond; no other value was tried."""
 
 def beyond_range(model: Model, log: Log, starts: Starts, pose: Array, session_time: float) -> list[str]:
     """A line for each discovered law whose range some free runs leave; pose (starts, horizon, 3): as predicted."""
-    if not model.discovered:
+    laws = [law for law in model.discovered if law.signal != ANGLE]  # a wheel's angle has no end
+    if not laws:
         return []
     found = signals(model, log, starts, pose, session_time)
     lines = []
-    for law in model.discovered:
+    for law in laws:
         ranges = knots_by_signal(law)
         outside = [np.any(_outside(at, found[signal]), axis=0) for signal, at in ranges.items()]
         count = int(np.sum(np.any(outside, axis=0)))

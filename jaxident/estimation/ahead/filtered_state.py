@@ -13,10 +13,11 @@ import jax.numpy as jnp
 
 from jaxident.array_types import Array, State, Wheels
 from jaxident.effects.coordinates import by_effect
-from jaxident.effects.discovered import Laws, with_laws
+from jaxident.effects.discovered import turned, with_laws
 from jaxident.effects.fast_input import SUBSTEPS, expected_pushes
-from jaxident.effects.fast_motion import Row, advance_row, drive_of, lags_of, report, rolling
-from jaxident.effects.past import Past
+from jaxident.effects.fast_motion import Rolling, Row, advance_row, drive_of, lags_of, report, rolling
+from jaxident.effects.law_arrays import Laws
+from jaxident.estimation.ahead.stretches import Stretch
 from jaxident.numerics import wrap
 from jaxident.robot.drive import force
 from jaxident.robot.noise import Noise
@@ -32,43 +33,26 @@ LIMIT, DOUBT = 5.0, 2.0
 and what the covariance is multiplied with instead: where poses go on to disagree, it is the state that is wrong."""
 
 
-class Stretch(NamedTuple):
-    """Rows of a log side by side: t (rows, n) [s] since the first row, session time (n,) [s] there, command (rows, n,
-    2), pose (rows, n, 3), seen (rows, n): poses that the filter takes in. first (n,): row of the first of them, from
-    which on it filters; speeds (2, n) along and in heading: the guess there, NaN keeps those of the run-up from rest.
-    begin (n,): row at which its run begins, moving as it may, or 0. past: what the commands of the whole run left
-    behind, leaves (rows, ..., n); no rows where no law asks for it.
-    """
-
-    t: Any
-    session: Any
-    command: Any
-    pose: Any
-    seen: Any
-    first: Any
-    speeds: Any
-    begin: Any
-    past: Past
-
-
 class Run(NamedTuple):
     """What the filter says of each row, then the free run: the pose that the camera would report (rows, 3, n), the
     covariance (rows, 3, 3, n) of its error by what is not known at the start row, and by the slip since; squared
-    normalised innovations (rows, n), none beyond LIMIT, summed over the three channels."""
+    normalised innovations (rows, n), none beyond LIMIT, summed over the three channels; angles (rows, laws, n) of the
+    wheels that laws go by, None without laws."""
 
     pose: Any
     start: Any
     slip: Any
     innovation: Any
+    angles: Any
 
 
 class _Belief(NamedTuple):
-    """Mean (states, n), the two parts of the covariance (states, states, n), and the excess speeds of the wheels."""
+    """Mean (states, n), the two parts of the covariance (states, states, n), and how the wheels roll."""
 
     mean: Any
     start: Any
     slip: Any
-    excess: Any
+    wheels: Rolling
 
 
 def filter_and_run(
@@ -76,9 +60,10 @@ def filter_and_run(
 ) -> Run:
     """The filter up to row `before`, that row's pose included, and the free run after it; pure.
 
-    vector (SIZE,): coordinates for the commands as they stand in the stretch, and so are the discovered laws. lost: the
-    probability that a command never arrives, None without. States are x, y, theta, v, w; then slip along and in heading
-    where `noise.slip_time` is given, and the camera's errors where its `correlation_time` is.
+    vector (SIZE,): coordinates for the commands as they stand in the stretch, and so are the discovered laws; their
+    phase (laws, n) is that where the filter begins. lost: the probability that a command never arrives, None without.
+    States are x, y, theta, v, w; then slip along and in heading where `noise.slip_time` is given, and the camera's
+    errors where its `correlation_time` is.
     """
     settings, drive = with_laws(by_effect(vector), laws), drive_of(vector)
     t = stretch.t
@@ -93,17 +78,20 @@ def filter_and_run(
     size = 5 + 2 * (noise.slip_time is not None) + 3 * (noise.correlation_time is not None)
     none = jnp.zeros((size, t.shape[1]))
     nothing, wide = jnp.zeros((size, *none.shape)), _wide(noise)
-    begin = _Belief(none, nothing, nothing, rolling(none[0]))
+    phase = None if laws is None else jnp.broadcast_to(laws.phase, (len(laws.phase), t.shape[1]))
+    begin = _Belief(none, nothing, nothing, rolling(none[0], phase))
 
     def body(belief, now):
         k, row, own, pose, seen, jolt = now
         belief = belief._replace(start=jnp.where(k == stretch.begin, wide, belief.start))
-        belief = _opened(settings, wide, belief, pose, stretch.speeds, k == stretch.first)
+        belief = _opened(settings, wide, belief, pose, stretch.speeds, phase, k == stretch.first)
+        guess = belief.mean
         belief, innovation = _take_in(settings, noise, belief, pose, seen & (k >= stretch.first) & (k <= before))
+        belief = _turned(settings, belief, guess)
         shown, camera = _seen_by(settings, belief.mean)
-        told = [_between(camera, part[:3, :3]) for part in (belief.start, belief.slip)]
+        told, angles = [_between(camera, part[:3, :3]) for part in (belief.start, belief.slip)], belief.wheels.angles
         belief = _one_row_on(settings, drive, noise, belief, row, own, jolt, k >= before)
-        return belief, (shown, *told, innovation)
+        return belief, (shown, *told, innovation, angles)
 
     return Run(*jax.lax.scan(body, begin, (number, rows, step, stretch.pose, stretch.seen, jolt))[1])
 
@@ -114,10 +102,20 @@ def _wide(noise: Noise) -> Array:
     return jnp.diag(jnp.stack([jnp.asarray(value, float) for value in variances]))[..., None]
 
 
-def _opened(settings, wide: Array, belief: _Belief, pose: Array, speeds: Array, here: Array) -> _Belief:
+def _turned(settings, belief: _Belief, guess: Array) -> _Belief:
+    """The belief whose wheels have turned as far as a pose moved it on from a guess (states, n)."""
+    dx, dy, turn = belief.mean[:3] - guess[:3]
+    way = dx * jnp.cos(belief.mean[2]) + dy * jnp.sin(belief.mean[2])
+    wheels = belief.wheels
+    return belief._replace(wheels=wheels._replace(angles=turned(settings, wheels.angles, way, turn)))
+
+
+def _opened(
+    settings, wide: Array, belief: _Belief, pose: Array, speeds: Array, phase: Array | None, here: Array
+) -> _Belief:
     """Where the filter begins: at the robot whose reported pose is the first, hardly known; at some speeds, hardly
-    known either, or at those of the run-up, as well as it knows them."""
-    mean, start, slip, excess = belief
+    known either, or at those of the run-up, as well as it knows them; wheels that laws go by at a phase (laws, n)."""
+    mean, start, slip, wheels = belief
     x, y, theta = pose.T
     for _ in range(3):  # the camera moves a pose by little that depends on it
         shown = report(settings, x, y, theta)
@@ -127,7 +125,8 @@ def _opened(settings, wide: Array, belief: _Belief, pose: Array, speeds: Array, 
     fresh = jnp.concatenate([jnp.stack([x, y, theta, v, w]), mean[5:]])
     kept = jnp.arange(len(mean)) >= jnp.where(guessed, 5, 3)[:, None]
     known = jnp.where((kept[:, :, None] & kept[:, None, :]).transpose(1, 2, 0), start, wide)
-    return _Belief(jnp.where(here, fresh, mean), jnp.where(here, known, start), jnp.where(here, 0.0, slip), excess)
+    wheels = wheels if phase is None else wheels._replace(angles=jnp.where(here, phase, wheels.angles))
+    return _Belief(jnp.where(here, fresh, mean), jnp.where(here, known, start), jnp.where(here, 0.0, slip), wheels)
 
 
 def _stationary(noise: Noise) -> list[Array]:
@@ -193,8 +192,8 @@ def _times(left: Array, right: Array) -> Array:
 def _one_row_on(settings, drive, noise: Noise, belief: _Belief, row: Row, step: Array, jolt, free: Array) -> _Belief:
     """The belief one row later; what is random in it counts as slip once the run is free. jolt (2, n): deviation of an
     acceleration by commands that may have been lost, None without."""
-    mean, start, slip, excess = belief
-    moved, slopes, excess = _moved(settings, drive, noise, mean, excess, row)
+    mean, start, slip, wheels = belief
+    moved, slopes, wheels = _moved(settings, drive, noise, mean, wheels, row)
     size = len(mean)
     change = jnp.zeros((size, size, mean.shape[1]))
     change = change.at[jnp.arange(2), jnp.arange(2)].set(1.0).at[:5, 2:5].set(slopes[:, :3])
@@ -218,7 +217,7 @@ def _one_row_on(settings, drive, noise: Noise, belief: _Belief, row: Row, step: 
     mean = jnp.concatenate([moved, *(share[None] * mean[k : k + 1] for k, share in enumerate(kept, start=5))])
     start, slip = (_times(_times(change, part), jnp.swapaxes(change, 0, 1)) for part in (start, slip))
     start = start.at[jnp.arange(2), jnp.arange(2)].add(start_bend)
-    return _Belief(mean, start + jnp.where(free, 0.0, fresh), slip + jnp.where(free, fresh, 0.0), excess)
+    return _Belief(mean, start + jnp.where(free, 0.0, fresh), slip + jnp.where(free, fresh, 0.0), wheels)
 
 
 def _bend(covariance: Array, step: Array, travelled: Array) -> Array:
@@ -227,14 +226,16 @@ def _bend(covariance: Array, step: Array, travelled: Array) -> Array:
     return heading * step**2 * covariance[3, 3] + 0.5 * heading**2 * travelled
 
 
-def _moved(settings, drive, noise: Noise, mean: Array, excess, row: Row):
+def _moved(settings, drive, noise: Noise, mean: Array, wheels: Rolling, row: Row):
     """The state (5, n) one row later, its derivatives (5, 5, n) by heading, v, w and a slip along and in heading, and
-    the excess speeds."""
+    how the wheels roll then."""
     x, y, theta, v, w = mean[:5]
     slip = mean[5:7] if noise.slip_time is not None else jnp.zeros_like(mean[:2])
     nudge = jnp.diag(jnp.array(STEPS)) @ jnp.eye(5, 6, 1)
     theta, v, w, *slip = (a + d[:, None] for a, d in zip((theta, v, w, *slip), nudge, strict=True))
-    lanes, excess = advance_row(settings, drive, State(x, y, theta, v, w), excess, row, slip)
+    angles = None if wheels.angles is None else wheels.angles[:, None]
+    lanes, after = advance_row(settings, drive, State(x, y, theta, v, w), wheels._replace(angles=angles), row, slip)
     lanes = jnp.stack([jnp.broadcast_to(part, theta.shape) for part in lanes])
     slopes = (lanes[:, 1:] - lanes[:, :1]) / jnp.array(STEPS)[:, None]
-    return lanes[:, 0], slopes, [jnp.broadcast_to(one, theta.shape)[0] for one in excess]
+    excess = [jnp.broadcast_to(one, theta.shape)[0] for one in after.excess]
+    return lanes[:, 0], slopes, Rolling(excess, None if angles is None else after.angles[:, 0])

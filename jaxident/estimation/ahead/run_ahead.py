@@ -1,6 +1,7 @@
 """From a physical model and a log to filtered starts and free runs, in blocks of stretches of one shape."""
 
-from collections.abc import Callable
+import dataclasses
+from collections.abc import Callable, Collection, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -10,14 +11,17 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.effects.catalogue import BY_CHANCE
 from jaxident.effects.coordinates import vector_of
-from jaxident.effects.discovered import Laws, laws_of
 from jaxident.effects.fast_input import RUN_UP
+from jaxident.effects.law_arrays import Laws, laws_of
+from jaxident.effects.law_kinds import ANGLE, MOST_LAWS
 from jaxident.effects.past import Past
 from jaxident.estimation.ahead.camera_noise import noise_for
-from jaxident.estimation.ahead.filtered_state import Run, Stretch, filter_and_run
+from jaxident.estimation.ahead.filtered_state import Run, filter_and_run
 from jaxident.estimation.ahead.parameter_spread import directions
-from jaxident.estimation.ahead.stretches import AXES, Starts, cut_stretches, until_last_start
+from jaxident.estimation.ahead.stretches import AXES, Starts, Stretch, cut_stretches, until_last_start
+from jaxident.estimation.ahead.wheel_phase import followed, phases_of
 from jaxident.estimation.increments.observations import blind, repeats
+from jaxident.estimation.poses.ways import ways
 from jaxident.log import Log
 from jaxident.numerics import wrap
 from jaxident.parallel import in_parallel
@@ -35,6 +39,10 @@ LANES, ROWS = 32, 64
 for each takes seconds to compile. 32 and 128 stretches cost 0.8 and 0.9 ms each on one core; of fewer at a time less is
 filled up, and more cores have work. A prediction from eight starts or fewer takes 30 ms, not the 14 of blocks of eight,
 which would be a second program to compile (6 s)."""
+
+
+ANGLE_STEP = 1e-3
+"""Step of the differences by the angle of a wheel [rad]."""
 
 
 class Ahead(NamedTuple):
@@ -59,11 +67,12 @@ def run_ahead(model: Model, log: Log, starts: Starts, horizon: int, *, burn_in: 
     """Free runs of a physical model over `horizon` rows from filtered states.
 
     With slip the filter forgets by itself and takes in FORGOTTEN rows at least. Without, it trusts the model for ever:
-    the burn-in alone then bounds how far small errors of the model pile up.
+    the burn-in alone then bounds how far small errors of the model pile up. Where a law goes by the angle of a wheel,
+    the rows before a start tell this angle.
     """
     noise = jax.tree.map(np.float64, noise_for(model, until_last_start(log, starts)))  # one type, one program
     slips = float(noise.slip_along) > 0.0 or float(noise.slip_heading) > 0.0
-    before = max(burn_in, FORGOTTEN) if slips else burn_in
+    before = max(burn_in, FORGOTTEN) if slips or by_angle(model) else burn_in
     step = float(np.median(np.concatenate([np.diff(run.t) for run in log.runs()])))
     first = int(np.ceil(RUN_UP / step)) + before
     chance = {effect.name: effect.parameters for effect in model.effects}
@@ -75,15 +84,56 @@ def run_ahead(model: Model, log: Log, starts: Starts, horizon: int, *, burn_in: 
                             past=bool(model.discovered))  # fmt: skip
     ahead = slice(first + 1, first + 1 + horizon)
 
-    def run(robot: Model, stretch: Stretch) -> Run:
-        return _in_blocks(vector_of(robot), laws_of(robot.discovered), noise, lost, stretch, first)
+    def run(robot: Model, phase: Array, stretch: Stretch) -> Run:
+        laws = laws_of(robot.discovered)
+        laws = None if laws is None else laws._replace(phase=phase)
+        return _in_blocks(vector_of(robot), laws, noise, lost, stretch, first)
 
-    found, stretch, run_up = _filtered(partial(run, model), stretch, ahead, burn_in)
+    phase, deviation = _phases(run, model, log, starts, stretch, first)
+    found, phase, stretch, run_up = _filtered(partial(run, model), phase, stretch, ahead, burn_in)
     pose, begin, slip = (np.moveaxis(leaf[ahead], -1, 0) for leaf in found[:3])
+    moved = [(other, 0.0, size) for other, size in directions(model)]
+    for k in by_angle(model):
+        moved.append((model, ANGLE_STEP * (np.arange(MOST_LAWS) == k)[:, None], ANGLE_STEP / deviation[k]))
     slopes = [
-        _less(np.moveaxis(run(other, stretch).pose[ahead], -1, 0), pose) / size for other, size in directions(model)
+        _less(np.moveaxis(run(other, phase + turn, stretch).pose[ahead], -1, 0), pose) / np.reshape(size, (-1, 1, 1))
+        for other, turn, size in moved
     ]
     return Ahead(pose, begin, slip, np.array(slopes).reshape(-1, *pose.shape), run_up)
+
+
+def by_angle(model: Model) -> list[int]:
+    """The laws that go by the angle of a wheel."""
+    return [k for k, law in enumerate(model.discovered) if law.signal == ANGLE]
+
+
+def _phases(
+    run: Callable[[Model, Array, Stretch], Run], model: Model, log: Log, starts: Starts, stretch: Stretch, first: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Phases (laws, starts) of the wheels that laws go by where the filter of each start begins, and their deviations
+    [rad]; first: row of the starts in their stretches."""
+    none, laws = np.zeros((MOST_LAWS, len(starts.row))), laws_of(model.discovered)
+    if laws is None or not by_angle(model):
+        return none, none
+    anchors, own = np.unique(followed(starts), return_inverse=True)
+    part = jax.tree.map(lambda axis, leaf: np.take(leaf, anchors, axis), AXES, stretch)
+
+    def misfit(phase: Array, acting: Sequence[int]) -> np.ndarray:
+        found = run(_silent(model, set(by_angle(model)) - set(acting)), phase, part)
+        return found.innovation[: first + 1].sum(axis=0)
+
+    phase, deviation = phases_of(misfit, by_angle(model), (MOST_LAWS, len(anchors)))
+    gone = ways(log.runs())[:, starts.run, starts.row - first + stretch.first]
+    return phase[:, own] + laws.turn @ (gone - gone[:, anchors[own]]), deviation[:, own]
+
+
+def _silent(model: Model, laws: Collection[int]) -> Model:
+    """The model without what some of its laws add."""
+    laws_left = tuple(
+        dataclasses.replace(law, value=np.zeros_like(law.value)) if k in laws else law
+        for k, law in enumerate(model.discovered)
+    )
+    return dataclasses.replace(model, discovered=laws_left)
 
 
 def _less(pose: Array, other: Array) -> np.ndarray:
@@ -94,25 +144,28 @@ def _less(pose: Array, other: Array) -> np.ndarray:
 
 
 def _filtered(
-    run: Callable[[Stretch], Run], stretch: Stretch, ahead: slice, burn_in: int
-) -> tuple[Run, Stretch, Array]:
+    run: Callable[[Array, Stretch], Run], phase: Array, stretch: Stretch, ahead: slice, burn_in: int
+) -> tuple[Run, Array, Stretch, Array]:
     """The filter and the free run of every stretch, over the rows `ahead`; where it does not converge, a run-up of the
-    commands from rest, laid on the last pose; the stretches as they were run, and where they are run-ups."""
-    found = run(stretch)
+    commands from rest, laid on the last pose; phases (laws, stretches) and stretches as they were run, and where they
+    are run-ups."""
+    found = run(phase, stretch)
     late = slice(max(ahead.start - burn_in, 0), ahead.start)
     seen = np.maximum(stretch.seen[late].sum(axis=0), 1)
     misses = found.innovation[late].sum(axis=0) / (3.0 * seen)
     lost = ~(np.isfinite(found.pose[ahead.stop - 1]).all(axis=0) & (misses < DIVERGED))
     if not lost.any():
-        return found, stretch, lost
+        return found, phase, stretch, lost
     rows = np.arange(len(stretch.t))[:, None]
     last = len(rows) - 1 - np.argmax(stretch.seen[::-1], axis=0)
     other = stretch._replace(
         seen=np.where(lost, rows == last, stretch.seen), first=np.where(lost, last, stretch.first),
         speeds=np.where(lost, np.nan, stretch.speeds),
     )  # fmt: skip
-    again = run(other)
-    return Run(*(np.where(lost, new, old) for new, old in zip(again, found, strict=True))), other, lost
+    if found.angles is not None:
+        phase = np.where(lost, np.take_along_axis(found.angles, last[None, None], axis=0)[0], phase)
+    again = run(phase, other)
+    return jax.tree.map(lambda new, old: np.where(lost, new, old), again, found), phase, other, lost
 
 
 _run_block = kept_program(Laws, Noise, Stretch, Past, Run)(filter_and_run)
@@ -126,6 +179,7 @@ def _in_blocks(vector: Array, laws: Laws | None, noise: Noise, lost: float | Non
     for begin in range(0, count, LANES):
         chosen = np.minimum(np.arange(begin, begin + LANES), count - 1)
         block = jax.tree.map(lambda axis, leaf, chosen=chosen: np.take(leaf, chosen, axis), AXES, stretch)
-        blocks.append((vector, laws, noise, lost, block, first))
+        own = None if laws is None else laws._replace(phase=laws.phase[:, chosen])
+        blocks.append((vector, own, noise, lost, block, first))
     parts = [jax.tree.map(np.asarray, block) for block in in_parallel(_run_block, blocks, ahead=False)]
-    return Run(*(np.concatenate(leaves, axis=-1)[..., :count] for leaves in zip(*parts, strict=True)))
+    return jax.tree.map(lambda *leaves: np.concatenate(leaves, axis=-1)[..., :count], *parts)

@@ -1,6 +1,6 @@
 """Stretches of a log around the rows that predictions start from, cut to one length, for the filter."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import numpy as np
@@ -8,13 +8,31 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.effects.past import NO_PAST, Past, past_of_run
 from jaxident.errors import InputError
-from jaxident.estimation.ahead.filtered_state import Stretch
 from jaxident.log import Log, join
 
 GUESSED = 8
 """Poses from which the speeds are guessed where a filter begins; it corrects the guess."""
 FEWEST = 3
 """Poses below which speeds are not guessed: those of the run-up stay."""
+
+
+class Stretch(NamedTuple):
+    """Rows of a log side by side: t (rows, n) [s] since the first row, session time (n,) [s] there, command (rows, n,
+    2), pose (rows, n, 3), seen (rows, n): poses that the filter takes in. first (n,): row of the first of them, from
+    which on it filters; speeds (2, n) along and in heading: the guess there, NaN keeps those of the run-up from rest.
+    begin (n,): row at which its run begins, moving as it may, or 0. past: what the commands of the whole run left
+    behind, leaves (rows, ..., n); no rows where no law asks for it.
+    """
+
+    t: Any
+    session: Any
+    command: Any
+    pose: Any
+    seen: Any
+    first: Any
+    speeds: Any
+    begin: Any
+    past: Past
 
 
 AXES = Stretch(1, 0, 1, 1, 1, 0, 1, 0, Past(1, 3, 3))

@@ -1,0 +1,39 @@
+"""The angles at which wheels begin, from sums of squares at a few angles."""
+
+import numpy as np
+
+from jaxident.estimation.ahead.wheel_phase import UNKNOWN, phases_of
+
+TRUE = np.array([[0.3, 2.0, 5.1], [6.1, 1.2, 3.3]])
+SIZE = np.array([[40.0, 90.0, 200.0], [30.0, 10.0, 70.0]])
+
+
+def squares(phase, acting):
+    """Each law that acts at a wrong angle, or does not act, leaves squares; the first disturbs the second."""
+    left = sum(SIZE[k] * (1.0 - np.cos(phase[k] - TRUE[k])) if k in acting else SIZE[k] for k in (0, 1))
+    return left + (8.0 * np.cos(phase[1] - phase[0]) if 0 not in acting else 0.0)
+
+
+def apart(angle, other):
+    return np.abs((angle - other + np.pi) % (2.0 * np.pi) - np.pi)
+
+
+def test_one_law_is_found_between_the_angles_that_are_tried():
+    phase, deviation = phases_of(squares, [1], (3, 3))
+    alone = lambda angle: squares(np.stack([0.0 * angle, angle]), [1])  # noqa: E731
+    fine = np.linspace(0.0, 2.0 * np.pi, 10_001)
+    best = fine[np.array([alone(np.full(3, angle)) for angle in fine]).argmin(axis=0)]
+    assert apart(phase[1], best).max() < 0.02
+    assert np.all(phase[[0, 2]] == 0.0)
+    # half the squares bend by SIZE / 2 at their least: a deviation is the root of one over that
+    np.testing.assert_allclose(deviation[1], np.sqrt(2.0 / SIZE[1]), rtol=0.5)
+
+
+def test_several_laws_are_found_beside_each_other():
+    phase, _ = phases_of(squares, [0, 1], (2, 3))
+    assert apart(phase, TRUE).max() < 0.02
+
+
+def test_an_angle_that_nothing_tells_is_unknown():
+    _, deviation = phases_of(lambda phase, acting: np.zeros(3), [0], (1, 3))
+    np.testing.assert_allclose(deviation, UNKNOWN)
