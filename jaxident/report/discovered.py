@@ -15,6 +15,7 @@ from jaxident.report.words import number, percent, plain, together
 
 TIMES_WORDS = {
     "1": "", "v": "speed times ", "w": "turn rate times ", "own push": "push of that wheel times ",
+    "own speed": "speed of that wheel times ",
     "cos heading": "the heading's cosine times ", "sin heading": "the heading's sine times ",
     **{name: f"change of that wheel's command over {tau:g} s times " for name, tau in CHANGES.items()},
 }  # fmt: skip
@@ -37,7 +38,13 @@ HEIGHT, MAP_HEIGHT = 2.1, 4.2
 def sentence(shown: Shown) -> str:
     """One law in a sentence."""
     law = shown.law
-    return f"to the {law.acts_on} comes {_words(shown.kind)}{_like(shown)}"
+    return f"to the {law.acts_on} comes {_words(shown.kind)}{_each_turn(shown)}{_like(shown)}"
+
+
+def _each_turn(shown: Shown) -> str:
+    """How far a wheel rolls from turn to turn of what is on it."""
+    period = shown.law.period
+    return "" if period is None else f", once every {number(1000.0 * period)} mm of its way"
 
 
 def _like(shown: Shown) -> str:
@@ -56,7 +63,7 @@ def discovered(found: Diagnosis) -> list[Section]:
     if not found.discovered:
         return []
     rows = [
-        (shown.law.acts_on, _words(shown.kind),
+        (shown.law.acts_on, f"{_words(shown.kind)}{_each_turn(shown)}",
          percent(shown.share), f"{shown.p_value:.2g}", _form(shown))
         for shown in found.discovered
     ]  # fmt: skip

@@ -11,7 +11,7 @@ import numpy as np
 
 from jaxident.array_types import Wheels
 from jaxident.effects.catalogue import to_vector
-from jaxident.effects.discovered import IDLE, Laws, laws_of
+from jaxident.effects.law_arrays import IDLE, Laws, laws_of
 from jaxident.numerics import require_float64
 from jaxident.parallel import at_most, in_parallel, trials_at_once
 from jaxident.robot.excitation import EXCITATIONS

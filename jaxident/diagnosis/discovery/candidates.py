@@ -17,8 +17,22 @@ from jaxident.diagnosis.motion.linear import motion_of
 from jaxident.diagnosis.motion.paths import left_behind
 from jaxident.diagnosis.motion.responses import Responses
 from jaxident.diagnosis.motion.windows import Windows
-from jaxident.effects.discovered import Laws
-from jaxident.effects.law_kinds import AHEAD, ALONG, BY_CAMERA, HEADING, LEFT, SIDEWAYS, TURN, WHEELS, remembered
+from jaxident.effects.law_arrays import Laws
+from jaxident.effects.law_kinds import (
+    AHEAD,
+    ALONG,
+    ANGLE,
+    BY_CAMERA,
+    HEADING,
+    LEFT,
+    OF_ONE_WHEEL,
+    PUSHES,
+    ROLLINGS,
+    SIDEWAYS,
+    TURN,
+    WHEELS,
+    remembered,
+)
 
 _left_behind = jax.jit(left_behind)
 KNOTS = 10
@@ -33,23 +47,43 @@ VARIED = 1e-6
 
 
 class Path(NamedTuple):
-    """Signals (windows, rows) along the path of a fit, and those of each wheel's own (windows, rows, 2); gain (2, 2) of
-    the nominal drive; seen (windows, numbers)."""
+    """Signals (windows, rows) along the path of a fit, and those of each wheel's own (windows, rows, 2); gain (2, 2)
+    and rates (2,) of the nominal drive; seen (windows, numbers). way [m] and turn [rad] since the run began, and the
+    time step [s] (windows, rows); run (windows,)."""
 
     signals: dict[str, Any]
     own: dict[str, Any]
     gain: Any
+    rates: Any
     seen: Any
+    way: Any
+    turn: Any
+    step: Any
+    run: Any
+
+
+class Turning(NamedTuple):
+    """What a law goes by that comes once per turn of something on a wheel: `Discovered.period` and `half_track` [m],
+    the angle [rad] of the wheel when each run begins (runs,); the power of the pattern that was found, and how much of
+    it the best of so many has by chance."""
+
+    period: float
+    half_track: float
+    phase: Any
+    power: float
+    by_chance: float
 
 
 class Candidate(NamedTuple):
     """A kind of law, the knots of each of its signals, and answers of the poses to a unit at each knot (windows,
-    numbers, knots); density: rows that lie nearest to each. Knots of a surface stand row by row."""
+    numbers, knots); density: rows that lie nearest to each. Knots of a surface stand row by row. turning: of a law that
+    goes by the angle of a wheel."""
 
     kind: Kind
     at: tuple[Any, ...]
     columns: Any
     density: Any
+    turning: Turning | None = None
 
 
 def path_of(fit: Solution, windows: Windows, laws: Laws | None = None) -> Path:
@@ -69,12 +103,23 @@ def path_of(fit: Solution, windows: Windows, laws: Laws | None = None) -> Path:
     own = {"1": np.ones_like(push), "own speed": speeds, "own push": push}
     own |= {name: np.asarray(part).transpose(2, 0, 1) for name, part in remembered(past, axis=1).items()}
     seen = np.repeat(np.asarray(windows.seen).T, 3, axis=1)
-    return Path(signals, own, gain, seen)
+    way, turn = (begin[:, None] + since for begin, since in zip(windows.way, _since(x, y, theta), strict=True))
+    return Path(signals, own, gain, rates, seen, way, turn, step, windows.run)
+
+
+def _since(x: Array, y: Array, theta: Array) -> tuple[np.ndarray, np.ndarray]:
+    """Way [m] and turn [rad] since the first row of each window."""
+    turned = np.diff(theta, axis=1, prepend=theta[:, :1])
+    middle = theta - 0.5 * turned
+    moved = [np.diff(place, axis=1, prepend=place[:, :1]) for place in (x, y)]
+    return np.cumsum(moved[0] * np.cos(middle) + moved[1] * np.sin(middle), axis=1), np.cumsum(turned, axis=1)
 
 
 def candidates(path: Path, responses: Responses) -> Iterator[Candidate]:
-    """Every kind of law whose signals vary, about a path."""
+    """Every kind of law whose signals vary, about a path; those that go by the angle of a wheel left out."""
     for kind in KINDS:
+        if kind.signal == ANGLE:
+            continue
         signals = _signals(kind, path)
         ranges = [np.quantile(signal, INSIDE) for signal in signals]
         if all(high - low > VARIED for low, high in ranges):
@@ -83,8 +128,24 @@ def candidates(path: Path, responses: Responses) -> Iterator[Candidate]:
             yield Candidate(kind, at, columns_of(kind, at, path, responses), density)
 
 
-def _signals(kind: Kind, path: Path) -> list[np.ndarray]:
+def by_angle(kind: Kind, turning: Turning, path: Path, responses: Responses) -> Candidate:
+    """A law of a kind that goes by the angle of a wheel."""
+    at = (np.linspace(-np.pi, np.pi, KNOTS),)
+    columns = columns_of(kind, at, path, responses, turning)
+    return Candidate(kind, at, columns, _nearest(_signals(kind, path, turning), at), turning)
+
+
+def _angle(turning: Turning, path: Path) -> np.ndarray:
+    """The angle of a wheel (windows, rows) in [-pi, pi)."""
+    turns = (path.way + turning.half_track * path.turn) / turning.period
+    angle = turning.phase[path.run][:, None] + 2.0 * np.pi * turns
+    return (angle + np.pi) % (2.0 * np.pi) - np.pi
+
+
+def _signals(kind: Kind, path: Path, turning: Turning | None = None) -> list[np.ndarray]:
     """What a law depends on, one or two."""
+    if turning is not None:
+        return [_angle(turning, path)]
     names = [name for name in (kind.signal, kind.second_signal) if name]
     if kind.acts_on == WHEELS:
         both = {name: np.stack([signal] * 2, axis=-1) for name, signal in path.signals.items() if name in names}
@@ -100,12 +161,22 @@ def _nearest(signals: list[np.ndarray], at: tuple[Any, ...]) -> np.ndarray:
     return np.bincount(place, minlength=int(np.prod([len(knots) for knots in at])))
 
 
-def columns_of(kind: Kind, at: tuple[Any, ...], path: Path, responses: Responses) -> np.ndarray:
+def columns_of(
+    kind: Kind, at: tuple[Any, ...], path: Path, responses: Responses, turning: Turning | None = None
+) -> np.ndarray:
     """Answers of the poses (windows, numbers, knots) to a unit at each knot of a law."""
-    signals = _signals(kind, path)
+    signals = _signals(kind, path, turning)
     shape = hats(signals[0], at[0])
     for signal, knots in zip(signals[1:], at[1:], strict=True):
         shape = (shape[..., :, None] * hats(signal, knots)[..., None, :]).reshape(*signal.shape, -1)
+    return answers_of(kind, shape, path, responses)
+
+
+def answers_of(kind: Kind, shape: Array, path: Path, responses: Responses) -> np.ndarray:
+    """Answers of the poses (windows, numbers, n) to some curves or surfaces (windows, rows, n; for both wheels at once
+    rows, 2, n) in the place of a law's."""
+    if kind.acts_on in OF_ONE_WHEEL:
+        return _by_one_wheel(kind, shape, path, responses)
     if kind.acts_on == WHEELS:
         shape = shape * path.own[kind.times][..., None]
         along, heading = (np.einsum("wrsk,s->wrk", shape, row) for row in path.gain)
@@ -115,6 +186,20 @@ def columns_of(kind: Kind, at: tuple[Any, ...], path: Path, responses: Responses
         return _by_camera(kind.acts_on, shape, path)
     answer = {ALONG: responses.along, HEADING: responses.heading, SIDEWAYS: responses.left}[kind.acts_on]
     return answer @ shape
+
+
+def _by_one_wheel(kind: Kind, shape: Array, path: Path, responses: Responses) -> np.ndarray:
+    """Answers of the poses to a push of one wheel, or to its rolling faster over the ground: a speed that is added to
+    the robot's is an acceleration of as much, and of the rate times as much against the drive."""
+    rolls = kind.acts_on in ROLLINGS
+    wheel = (ROLLINGS if rolls else PUSHES).index(kind.acts_on)
+    shape = shape * path.own[kind.times][..., wheel, None]
+    gain = path.gain[:, wheel]
+    if not rolls:
+        return responses.along @ (gain[0] * shape) + responses.heading @ (gain[1] * shape)
+    change = np.diff(shape, axis=1, append=shape[:, -1:]) / path.step[..., None]
+    along, heading = (g * (change / rate + shape) for g, rate in zip(gain, path.rates, strict=True))
+    return responses.along @ along + responses.heading @ heading
 
 
 def _by_camera(act: str, shape: Array, path: Path) -> np.ndarray:

@@ -37,12 +37,16 @@ class Bent(NamedTuple):
     variance: float
 
 
-def precision(at: Sequence[Array], nominal: Array) -> np.ndarray:
+def precision(at: Sequence[Array], nominal: Array, closed: bool = False) -> np.ndarray:
     """Prior precision (n, n) of a law of unit size with some knots along each of its signals; n: all its knots, row by
-    row. nominal (n, m): combinations of values that the nominal robot has as well, and the law has not."""
+    row. nominal (n, m): combinations of values that the nominal robot has as well, and the law has not. closed: of a
+    curve whose last knot is its first one again, as an angle's."""
     whole, order = np.zeros((1, 1)), 2 if len(at) == 1 else 1
     for knots in at:
         bend = np.diff(np.eye(len(knots)), order, axis=0)
+        if closed:
+            unit = np.eye(len(knots))
+            bend = np.vstack([bend, unit[-2] - 2.0 * unit[-1] + unit[1], np.sqrt(HELD) * (unit[-1] - unit[0])])
         whole = np.kron(whole, np.eye(len(knots))) + np.kron(np.eye(len(whole)), bend.T @ bend)
     basis, _ = np.linalg.qr(nominal)
     return whole + FLAT * np.eye(len(whole)) + HELD * basis @ basis.T

@@ -5,16 +5,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.discovery.candidates import Candidate, columns_of, path_of
+from jaxident.diagnosis.discovery.candidates import Candidate, Turning, columns_of, path_of
 from jaxident.diagnosis.discovery.curves import precision, solved
 from jaxident.diagnosis.discovery.kinds import Kind, nominal_part
 from jaxident.diagnosis.fit.prior import unlikeliness, with_prior
 from jaxident.diagnosis.fit.refit import Data, Solution, best_starts, covariance_from
 from jaxident.diagnosis.motion.linear import Gram, Linear, gram, linearise
 from jaxident.diagnosis.motion.responses import respond
+from jaxident.diagnosis.motion.windows import Windows
 from jaxident.diagnosis.noise.law import Law
 from jaxident.effects.coordinates import limits
-from jaxident.effects.discovered import Laws, laws_of
+from jaxident.effects.law_arrays import Laws, laws_of
 from jaxident.effects.law_kinds import scaled
 from jaxident.robot.model import Discovered
 
@@ -29,7 +30,8 @@ SHORTER = (1.0, 0.5, 0.2, 0.05)
 class Curve(NamedTuple):
     """A discovered law for commands over their largest: knots along each of its signals, values there and their
     deviations (knots,), the variance of its roughness prior, and how many rows lie nearest to each knot; alike: other
-    kinds of laws that would explain nearly as much. Knots of a surface stand row by row."""
+    kinds of laws that would explain nearly as much; turning: of a law that goes by the angle of a wheel. Knots of a
+    surface stand row by row."""
 
     kind: Kind
     at: tuple[Any, ...]
@@ -38,6 +40,7 @@ class Curve(NamedTuple):
     variance: float
     density: Any
     alike: tuple[Kind, ...] = ()
+    turning: Turning | None = None
 
 
 class Bending(NamedTuple):
@@ -59,17 +62,25 @@ class _Around(NamedTuple):
     summed: Any
 
 
-def laws_from(curves: tuple[Curve, ...]) -> Laws | None:
-    """The curves as the integrators take them."""
-    return laws_of([as_law(curve) for curve in curves])
+def laws_from(curves: tuple[Curve, ...], windows: Windows) -> Laws | None:
+    """The curves as the integrators take them, on some windows."""
+    laws = laws_of([as_law(curve) for curve in curves])
+    if laws is None:
+        return None
+    phase = np.zeros((len(laws.phase), len(windows.session)))
+    for k, curve in enumerate(curves):
+        if curve.turning is not None:
+            phase[k] = curve.turning.phase
+    return laws._replace(phase=phase)
 
 
 def as_law(curve: Curve, largest: float = 1.0) -> Discovered:
     """A curve as a model holds it, in the user's unit."""
     kind, (at, *second), shape = curve.kind, curve.at, [len(knots) for knots in curve.at]
     value, deviation = (np.reshape(column, shape) for column in (curve.value, curve.deviation))
+    turning = {} if curve.turning is None else {key: getattr(curve.turning, key) for key in ("period", "half_track")}
     law = Discovered(kind.acts_on, kind.times, kind.signal, at, value, deviation, kind.second_signal,
-                     second[0] if second else None)  # fmt: skip
+                     second[0] if second else None, **turning)  # fmt: skip
     return scaled(law, largest)
 
 
@@ -79,14 +90,16 @@ def curve_columns(fit: Solution, data: Data, curves: tuple[Curve, ...]) -> np.nd
     if not curves:
         return none
     responses = respond(np.exp(fit.vector[:2]), fit.linear.residual, data.windows)
-    path = path_of(fit, data.windows, laws_from(curves))
-    return np.concatenate([columns_of(curve.kind, curve.at, path, responses) for curve in curves], axis=2)
+    path = path_of(fit, data.windows, laws_from(curves, data.windows))
+    columns = [columns_of(curve.kind, curve.at, path, responses, curve.turning) for curve in curves]
+    return np.concatenate(columns, axis=2)
 
 
 def prior_of(curve: Curve | Candidate) -> np.ndarray:
     """Prior precision (knots, knots) of a law of unit size, which has nothing that the nominal robot has where the
     robot was."""
-    return precision(curve.at, curve.density[:, None] * nominal_part(curve.kind, curve.at))
+    nominal = curve.density[:, None] * nominal_part(curve.kind, curve.at)
+    return precision(curve.at, nominal, closed=curve.turning is not None)
 
 
 def smoothness(curves: tuple[Curve, ...]) -> np.ndarray:
@@ -105,7 +118,7 @@ def refit_with(data: Data, fit: Solution, curves: tuple[Curve, ...]) -> tuple[So
     the covariance of all but start states."""
     low, high = (bound[fit.places] for bound in limits())
     smooth = smoothness(curves)
-    starts, cost = best_starts(data, fit.vector, fit.starts, np.zeros_like(fit.starts), laws_from(curves))
+    starts, cost = best_starts(data, fit.vector, fit.starts, np.zeros_like(fit.starts), laws_from(curves, data.windows))
     cost = cost + unlikeliness(fit.vector, data.windows) + _roughness(curves, smooth)
     now = fit._replace(starts=starts)
     around = _look(data, now, curves, smooth)
@@ -128,7 +141,7 @@ def refit_with(data: Data, fit: Solution, curves: tuple[Curve, ...]) -> tuple[So
 
 def _look(data: Data, now: Solution, curves: tuple[Curve, ...], smooth: Array) -> _Around:
     """The linearisation about a fit and its curves."""
-    linear = linearise(now.vector, now.starts, data.windows, now.places, laws_from(curves))
+    linear = linearise(now.vector, now.starts, data.windows, now.places, laws_from(curves, data.windows))
     columns = curve_columns(now._replace(linear=linear), data, curves)
     whole = np.concatenate([linear.slopes, columns, linear.residual[..., None]], axis=2)
     found = gram(data.whitener, whole, linear.starts)
@@ -145,7 +158,7 @@ def _moved(data: Data, now: Solution, curves, around: _Around, step: Array, boun
     step = np.concatenate([vector[now.places] - now.vector[now.places], step[own:]])
     bent = _with_values(curves, _values(curves) + step[own:])
     moved = around.gram.solve[:, :, -1] - around.gram.solve[:, :, :-1] @ step
-    starts, cost = best_starts(data, vector, now.starts, moved.T, laws_from(bent))
+    starts, cost = best_starts(data, vector, now.starts, moved.T, laws_from(bent, data.windows))
     return vector, bent, starts, cost + unlikeliness(vector, data.windows)
 
 

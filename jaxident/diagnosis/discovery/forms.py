@@ -7,7 +7,7 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.discovery.kinds import Kind, at_knots, nominal_part
-from jaxident.effects.law_kinds import knots_by_signal
+from jaxident.effects.law_kinds import ANGLE, knots_by_signal
 from jaxident.robot.model import Discovered
 
 LIKE = 0.8
@@ -17,6 +17,8 @@ SIMPLER = 0.01
 BENDS = np.linspace(0.1, 0.9, 17)
 """Places of a bend or a step that are tried, as parts of the range of a signal."""
 
+ROUND = ("c sin(s)", "c cos(s)", "c sin(2 s)", "c cos(2 s)")
+"""Forms of an angle."""
 Forms = dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]]
 SHAPES: Forms = {
     "c": lambda s, _: np.ones_like(s),
@@ -40,11 +42,8 @@ BENT: Forms = {
     "c exp(-s / s0)": lambda s, s0: np.exp(-s / s0),
 }
 """Forms that begin at some s0."""
-ONLY_OF = {
-    "c sin(s)": "heading", "c cos(s)": "heading", "c sin(2 s)": "heading", "c cos(2 s)": "heading",
-    "c exp(-s / s0)": "since reversal",
-}  # fmt: skip
-"""Forms of one signal alone."""
+ONLY_OF = {**dict.fromkeys(ROUND, ("heading", ANGLE)), "c exp(-s / s0)": ("since reversal",)}
+"""Forms of some signals alone."""
 PRODUCTS: Forms = {
     "c s t": lambda s, t: s * t,
     "c |s| t": lambda s, t: np.abs(s) * t,
@@ -101,7 +100,7 @@ def _of_one(law: Discovered) -> Tried:
 
 def _is_for(name: str, law: Discovered) -> bool:
     """Whether a form is tried for a law's signal."""
-    return ONLY_OF.get(name, law.signal) == law.signal
+    return law.signal in ONLY_OF.get(name, (law.signal,)) and (law.signal != ANGLE or name in ROUND)
 
 
 def _of_two(law: Discovered) -> Tried:

@@ -5,7 +5,21 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.effects.catalogue import BY_KIND
-from jaxident.effects.law_kinds import AHEAD, ALONG, BY_CAMERA, CHANGES, HEADING, HEATS, LEFT, SIDEWAYS, TURN, WHEELS
+from jaxident.effects.law_kinds import (
+    AHEAD,
+    ALONG,
+    ANGLE,
+    BY_CAMERA,
+    CHANGES,
+    HEADING,
+    HEATS,
+    LEFT,
+    PUSHES,
+    ROLLINGS,
+    SIDEWAYS,
+    TURN,
+    WHEELS,
+)
 
 OF_FORCE = ("v", "w", "heading", "x", "y", "time", "push right", "push left", "since reversal")
 ELSEWHERE = ("heading", "x", "y", "time", "since reversal")
@@ -13,7 +27,7 @@ ELSEWHERE = ("heading", "x", "y", "time", "since reversal")
 SITE_OF_SIGNAL = {
     "v": "drive", "w": "drive", "heading": "contact", "x": "contact", "y": "contact", "time": "time",
     "push right": "actuation", "push left": "actuation", "since reversal": "contact", "own speed": "drive",
-    "own push": "actuation", **dict.fromkeys([*HEATS, *CHANGES], "actuation"),
+    "own push": "actuation", ANGLE: "drive", **dict.fromkeys([*HEATS, *CHANGES], "actuation"),
 }  # fmt: skip
 """The site of a law that acts on accelerations or pushes, by its signal; where a command's change is multiplied with a
 curve, by the change."""
@@ -67,6 +81,8 @@ KINDS = (
     *(Kind(act, "1", signal) for act in (AHEAD, LEFT, TURN) for signal in ("heading", "x", "y")),
     *(Kind(act, times, "x", "y") for act, times in FLOOR),
     *(Kind(act, "1", *pair) for act in (ALONG, HEADING) for pair in (("v", "w"), ("push right", "push left"))),
+    *(Kind(act, times, ANGLE) for act in PUSHES for times in ("1", "own push")),
+    *(Kind(act, "own speed", ANGLE) for act in ROLLINGS),
 )
 """All that are tried. What stands as a product in two of them (v times a curve of w, w times one of v) stands twice."""
 
@@ -80,6 +96,8 @@ def nominal_part(kind: Kind, at: tuple[Any, ...]) -> np.ndarray:
     """Values (knots, n) of laws that the nominal robot has itself: rates, couplings and gains."""
     signals = dict(zip(kind.names[2:], at_knots(at), strict=True))
     count = int(np.prod([len(knots) for knots in at]))
+    if kind.signal == ANGLE:
+        return np.ones((count, 1))
     if kind.acts_on not in (ALONG, HEADING, WHEELS):
         return np.zeros((count, 0))
     if kind.times != "1":

@@ -4,6 +4,7 @@ What a curve is worth is the smaller of its log evidence, less the price of havi
 brings to stretches that it was not fitted to. The runs kept for judging have no part in this.
 """
 
+import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +13,7 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.causes.finding import Finding
 from jaxident.diagnosis.causes.search_rounds import SURE
 from jaxident.diagnosis.causes.settled import LIKELY, whiten
-from jaxident.diagnosis.discovery.candidates import candidates, path_of
+from jaxident.diagnosis.discovery.candidates import by_angle, candidates, path_of
 from jaxident.diagnosis.discovery.curves import Bent, bend
 from jaxident.diagnosis.discovery.fit import (
     Bending,
@@ -24,6 +25,7 @@ from jaxident.diagnosis.discovery.fit import (
     smoothness,
 )
 from jaxident.diagnosis.discovery.kinds import KINDS
+from jaxident.diagnosis.discovery.wheel_angle import turnings
 from jaxident.diagnosis.fit.prior import with_prior
 from jaxident.diagnosis.fit.refit import Data, Solution
 from jaxident.diagnosis.motion.linear import without_starts
@@ -95,14 +97,19 @@ def worthy(data: Data, fit: Solution, curves: tuple[Curve, ...]) -> list[Worthy]
     responses = respond(np.exp(fit.vector[:2]), fit.linear.residual, data.windows)
     base, prior = _base(data, fit, curves)
     found: list[Worthy] = []
-    for each in candidates(path_of(fit, data.windows, laws_from(curves)), responses):
+    path = path_of(fit, data.windows, laws_from(curves, data.windows))
+    turning = turnings(data, fit, base, path, responses)
+    periodic = (by_angle(*pair, path, responses) for pair in turning)
+    for each in itertools.chain(candidates(path, responses), periodic):
         if any(each.kind == curve.kind for curve in curves):
             continue
         bent = _beside(data, fit, base, prior, each.columns, prior_of(each))
-        worth = min(bent.evidence - PRICE, bent.held_out)
+        chance = 0.0 if each.turning is None else each.turning.by_chance
+        worth = min(bent.evidence - PRICE, bent.held_out) - chance
         if worth > SURE:
             none = np.zeros(each.columns.shape[2])
-            found.append(Worthy(worth, Curve(each.kind, each.at, none, none, bent.variance, each.density)))
+            curve = Curve(each.kind, each.at, none, none, bent.variance, each.density, turning=each.turning)
+            found.append(Worthy(worth, curve))
     return [
         one._replace(curve=one.curve._replace(alike=tuple(
             other.curve.kind for other in found if other is not one and other.worth > ALIKE * one.worth

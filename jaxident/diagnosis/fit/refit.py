@@ -10,8 +10,8 @@ from jaxident.diagnosis.motion.linear import Linear, follow, gram, linearise, no
 from jaxident.diagnosis.motion.rims import Rims, rim_speeds
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.coordinates import INSTANTS, NOMINAL, PLACES, STEPPED, free_places, limits, neutral_vector, sizes
-from jaxident.effects.discovered import Laws
 from jaxident.effects.effect import EDGE
+from jaxident.effects.law_arrays import Laws
 
 MOST_STEPS = 20
 """Of one refit; what fits arrives in two to nine, what crawls is mostly an effect that is not there."""

@@ -21,7 +21,7 @@ from jaxident.effects.coordinates import (
     seeds,
     unit_factors,
 )
-from jaxident.effects.discovered import Laws, laws_of
+from jaxident.effects.law_arrays import Laws, laws_of
 from jaxident.errors import InputError
 from jaxident.robot.model import Model, require_physical
 from jaxident.robot.noise import Noise

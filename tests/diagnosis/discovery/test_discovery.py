@@ -8,7 +8,7 @@ import pytest
 
 import jaxident as ji
 from jaxident.diagnosis.causes.finding import find_effects
-from jaxident.diagnosis.discovery.candidates import SURFACE_KNOTS, Path, columns_of, hats
+from jaxident.diagnosis.discovery.candidates import SURFACE_KNOTS, Path, Turning, columns_of, hats
 from jaxident.diagnosis.discovery.curves import bend, precision, solved
 from jaxident.diagnosis.discovery.fit import Curve, as_law, prior_of
 from jaxident.diagnosis.discovery.forms import beyond, form_of
@@ -65,7 +65,8 @@ def test_noise_alone_brings_no_curve():
 
 
 def curve_of(kind: Kind, value) -> Curve:
-    return Curve(kind, (AT,), value, np.full(KNOTS, 0.01), 1.0, np.ones(KNOTS))
+    turning = Turning(0.2, 0.1, np.zeros(1), 9.0, 1.0) if kind.signal == "own angle" else None
+    return Curve(kind, (AT,), value, np.full(KNOTS, 0.01), 1.0, np.ones(KNOTS), turning=turning)
 
 
 def surface_of(kind: Kind, value) -> Curve:
@@ -126,7 +127,7 @@ def test_a_surface_answers_as_its_knots_say():
     rng = np.random.default_rng(4)
     x, y, v = rng.uniform(-1.0, 1.0, (3, 2, 30))
     answer = rng.normal(size=(2, 90, 30))
-    path = Path({"x": x, "y": y, "v": v}, {}, np.eye(2), np.ones((2, 90)))
+    path = Path({"x": x, "y": y, "v": v}, {}, np.eye(2), np.ones(2), np.ones((2, 90)), x, y, x, np.arange(2))
     columns = columns_of(Kind("acceleration along", "v", "x", "y"), (FLOOR, FLOOR), path, Responses(answer, None, None))
     value = rng.normal(size=(SURFACE_KNOTS, SURFACE_KNOTS))
     rows = np.array([np.interp(np.ravel(y), FLOOR, row) for row in value])
@@ -208,6 +209,20 @@ def test_laws_that_explain_as_much_are_named():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("act", "times"), [(act, times) for act, times, signal, *_ in KINDS if signal == "own angle"])
+def test_what_comes_once_per_turn_of_a_wheel_is_discovered(act, times):
+    """Every run begins at an angle of its own, which nobody tells."""
+    at = np.linspace(-np.pi, np.pi, 10)
+    half = 0.089 if "right" in act else -0.089  # as far from the middle as the gains say
+    law = Discovered(act, times, "own angle", at, 0.2 * np.cos(at), period=0.16, half_track=half)
+    first = searched(dataclasses.replace(ROBOT, discovered=(law,)), 4)[0].curves[0]
+    assert first.kind == Kind(act, times, "own angle")
+    assert first.turning.period == pytest.approx(0.16, rel=0.01)
+    assert first.turning.half_track == pytest.approx(half, rel=0.1)
+    assert np.abs(first.value - 0.2 * np.cos(at)).max() < 0.06
+
+
+@pytest.mark.slow
 def test_robots_with_nothing_to_discover_have_no_curve():
     assert [len(searched(ROBOT, seed)) for seed in range(2, 8)] == [0] * 6
 
@@ -231,4 +246,5 @@ def test_the_nominal_part_of_a_law_is_what_the_linear_robot_has(kind):
     forces = kind.acts_on.startswith(("acceleration", "push"))
     linear = sum(name in ("v", "w", "push right", "push left", "own speed", "own push") for name in kind.names[2:])
     columns = {"1": linear, "v": 1, "w": 1, "own push": 1}.get(kind.times, 0) if forces else 0
+    columns = 1 if kind.signal == "own angle" else columns  # a mean over a turn is no matter of the angle
     assert nominal_part(kind, at).shape == (int(np.prod([len(each) for each in at])), columns)

@@ -1,0 +1,160 @@
+"""What comes once per turn of something on a wheel: its period, where the wheel is, and its angle when a run begins.
+
+A pattern exp(i (k way + q turn)) is held against what the poses ask to be added to a wheel's push. Each window gives
+one complex number, and these are added up over a run at the angles that its windows begin at, for many k [rad/m] and
+q [rad/rad]: a periodogram (Lomb 1976, Astrophysics and Space Science 39) over the way of a wheel in place of time. Of
+noise, the square of a run's sum over the sum of squares is an exponential variable of mean 1; from this follows what
+the best of so many patterns brings by chance.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from jax.scipy.special import gammaincc
+
+from jaxident.array_types import Array
+from jaxident.diagnosis.discovery.candidates import Path, Turning, answers_of
+from jaxident.diagnosis.discovery.kinds import Kind
+from jaxident.diagnosis.fit.refit import Data, Solution
+from jaxident.diagnosis.motion.linear import without_starts
+from jaxident.diagnosis.motion.responses import Responses
+from jaxident.effects.law_kinds import ANGLE, PUSHES, ROLLINGS
+
+SLOWEST, FASTEST = 0.7, np.pi
+"""Turn of a pattern at the robot's mean speed: at least in a second [rad], at most from row to row [rad]. From 2 rad in
+a second on, a wheel of 2.4 m round of a slow robot was not found; no others were tried."""
+PLACES = (0.3, 1.2)
+"""Half track over what gains and rates say: less than one where wheels slide in turns. No others were tried."""
+APART = 0.7
+"""Angle [rad] at the end of a window, or of a run, from one k or q to the next. No other was tried."""
+ZOOMS, AROUND = 3, np.linspace(-1.0, 1.0, 7)
+"""Times that the search looks closer, and where then, in steps of the grid before; the next grid is half as wide. No
+others were tried."""
+
+
+class _Seen(NamedTuple):
+    """Of a kind of law: what the poses ask for in each row (windows, rows); way and turn since the window's first row
+    (windows, rows), and those of this row in its run (windows,); the windows of each run."""
+
+    asked: Array
+    way: Array
+    turn: Array
+    gone: Array
+    turned: Array
+    runs: list[Array]
+
+
+Found = list[tuple[Kind, Turning]]
+"""Kinds of laws, and what each goes by."""
+
+
+def turnings(data: Data, fit: Solution, base: Array, path: Path, responses: Responses) -> Found:
+    """For each wheel and each kind of law that goes by its angle the pattern that the poses ask for most; base
+    (windows, numbers, n): whitened columns of a fit free of start states, the residual last."""
+    found: Found = []
+    residual = _left(base)
+    for number, (push, roll) in enumerate(zip(PUSHES, ROLLINGS, strict=True)):
+        along, heading = path.gain[:, number] / path.rates
+        half = abs(float(along / heading))
+        side = float(np.sign(along * heading))
+        for kind in (Kind(push, "1", ANGLE), Kind(push, "own push", ANGLE), Kind(roll, "own speed", ANGLE)):
+            seen = _seen(data, fit, residual, path, responses, kind)
+            found.append((kind, _strongest(seen, path, half, side)))
+    return found
+
+
+def _left(base: Array) -> np.ndarray:
+    """What a fit leaves (windows, numbers): of its residual what its columns do not explain."""
+    columns, residual = base[..., :-1].reshape(-1, base.shape[2] - 1), base[..., -1].ravel()
+    length = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+    size = np.linalg.lstsq(columns / length, residual, rcond=1e-10)[0]
+    return (residual - columns / length @ size).reshape(base.shape[:2])
+
+
+def _seen(data: Data, fit: Solution, residual: Array, path: Path, responses: Responses, kind: Kind) -> _Seen:
+    """What the poses ask for in each row, of a kind."""
+    count, rows = path.way.shape
+    unit = np.broadcast_to(np.eye(rows), (count, rows, rows))
+    answers, _ = without_starts(data.whitener, answers_of(kind, unit, path, responses), fit.linear.starts)
+    asked = (answers.transpose(0, 2, 1) @ residual[..., None])[..., 0]
+    gone, turned, run = path.way[:, 0], path.turn[:, 0], np.asarray(data.windows.run)
+    runs = [np.flatnonzero(run == number) for number in range(len(data.windows.session))]
+    return _Seen(asked, path.way - gone[:, None], path.turn - turned[:, None], gone, turned, runs)
+
+
+def _strongest(seen: _Seen, path: Path, half: float, side: float) -> Turning:
+    """The pattern of the largest sum of all runs, of a wheel about `half` [m] from the middle on one side (1 right, -1
+    left)."""
+    (k_step, more_k), (q_step, more_q) = (
+        _steps(seen, *parts) for parts in ((seen.way, seen.gone), (seen.turn, seen.turned))
+    )
+    a_row = max(float(np.mean(np.abs(np.diff(seen.way, axis=1)))), 1e-9)
+    k_all = np.arange(SLOWEST * float(np.median(path.step)) / a_row, FASTEST / a_row, k_step)
+    q_all = np.arange(PLACES[0] * k_all[0] * half, PLACES[1] * k_all[-1] * half + q_step, q_step)
+    waves = _waves(seen.turn, side * q_all) * _waves(seen.turned, side * q_all)[:, None]
+    finer = _waves(seen.gone, more_k), _waves(seen.turned, side * more_q)
+    best, count = (-1.0, 0.0, 0.0), 0
+    for k in k_all:
+        near = np.flatnonzero((q_all >= PLACES[0] * k * half) & (q_all <= PLACES[1] * k * half + q_step))
+        power = _powers(seen, k, waves[..., near], *finer)
+        count += power.size
+        i, j, m = np.unravel_index(power.argmax(), power.shape)
+        best = max(best, (float(power[i, j, m]), k + more_k[i], side * (q_all[near][j] + more_q[m])))
+    k, q = _closer(seen, best, k_step / len(more_k), q_step / len(more_q))
+    phase = -np.angle(_sums(seen, np.array([k]), np.array([q]))[:, 0])
+    return Turning(2.0 * np.pi / k, q / k, phase, best[0], _by_chance(len(seen.runs), count))
+
+
+def _steps(seen: _Seen, since: Array, begun: Array) -> tuple[float, np.ndarray]:
+    """Step from one rate to the next that tells patterns apart within windows, and rates between two of these that tell
+    them apart within runs; since (windows, rows) the first row of a window, begun (windows,) in its run."""
+    far = max(float(np.quantile(np.abs(since[:, -1]), 0.9)), 1e-6)
+    wide = max(float(np.ptp(begun[own])) if len(own) else 0.0 for own in seen.runs)
+    count = int(np.ceil(wide / far)) + 1
+    return APART / far, APART / far * ((np.arange(count) + 0.5) / count - 0.5)
+
+
+def _waves(way: Array, rate: Array) -> np.ndarray:
+    """exp(i rate way) (..., rates); single precision halves the time, and angles are small."""
+    return np.exp(1j * way[..., None] * rate).astype(np.complex64)
+
+
+def _powers(seen: _Seen, k: float, waves: Array, more_k: Array, more_q: Array) -> np.ndarray:
+    """Power (more k, q, more q) of patterns at k and some q, waves (windows, rows, q), each moved by little, waves
+    (windows, more) at the first row of each window."""
+    asked = seen.asked * np.exp(1j * k * (seen.gone[:, None] + seen.way))
+    each = (asked.astype(np.complex64)[:, None] @ waves)[:, 0]
+    moved = each[..., None] * more_q[:, None]
+    total: Array = 0.0
+    for own in seen.runs:
+        whole = np.tensordot(more_k[own], moved[own], axes=(0, 0))
+        squares = np.maximum(np.sum(np.abs(each[own]) ** 2, axis=0), 1e-30)
+        total = total + (whole.real**2 + whole.imag**2) / squares[:, None]
+    return total
+
+
+def _sums(seen: _Seen, k: Array, q: Array) -> np.ndarray:
+    """Sums (runs, n) over each run of what patterns k (n,), q (n,) are asked for."""
+    angle = (seen.gone[:, None] + seen.way)[..., None] * k + (seen.turned[:, None] + seen.turn)[..., None] * q
+    each = np.sum(seen.asked[..., None] * np.exp(1j * angle), axis=1)
+    return np.stack([each[own].sum(axis=0) for own in seen.runs])
+
+
+def _closer(seen: _Seen, best: tuple[float, float, float], k_step: float, q_step: float) -> tuple[float, float]:
+    """k and q where the sums are largest near some k and q."""
+    _, k, q = best
+    scale = np.array([np.sum(seen.asked[own] ** 2) for own in seen.runs])
+    scale = np.where(scale > 0.0, scale, 1.0)[:, None]
+    for zoom in range(ZOOMS):
+        grid = np.meshgrid(k + 0.5**zoom * k_step * AROUND, q + 0.5**zoom * q_step * AROUND)
+        k_near, q_near = (part.ravel() for part in grid)
+        power = np.sum(np.abs(_sums(seen, k_near, q_near)) ** 2 / scale, axis=0)
+        k, q = k_near[power.argmax()], q_near[power.argmax()]
+    return k, q
+
+
+def _by_chance(runs: int, count: int) -> float:
+    """What the best of `count` patterns brings by chance: the sum of an exponential variable for each run that one of
+    so many exceeds."""
+    tried = np.linspace(0.0, 40.0 + 4.0 * runs, 4001)
+    return float(tried[np.argmax(np.asarray(gammaincc(runs, tried)) * count < 1.0)])

@@ -1,0 +1,79 @@
+"""What comes once per turn of a wheel: whether it is found, and how much is found by chance."""
+
+import numpy as np
+import pytest
+
+from jaxident.diagnosis.discovery import wheel_angle
+from jaxident.diagnosis.discovery.candidates import Path
+from jaxident.diagnosis.discovery.curves import precision
+from jaxident.diagnosis.discovery.wheel_angle import _powers, _Seen, _steps, _strongest, _waves
+
+RUNS, WINDOWS, ROWS, STEP = 3, 12, 30, 0.05
+PERIOD, HALF = 0.19, 0.075
+
+
+def seen_by(rng, size: float) -> _Seen:
+    """Noise of unit variance and a pattern of some size of the right wheel, along random ways of three runs."""
+    speed = np.repeat(rng.normal(0.0, 0.25, RUNS * WINDOWS * 3), ROWS // 3).reshape(RUNS, -1)
+    spin = np.repeat(rng.normal(0.0, 1.5, RUNS * WINDOWS * 3), ROWS // 3).reshape(RUNS, -1)
+    way, turn = (np.cumsum(STEP * part, axis=1).reshape(RUNS * WINDOWS, ROWS) for part in (speed, spin))
+    run = np.repeat(np.arange(RUNS), WINDOWS)
+    phase = rng.uniform(0.0, 2.0 * np.pi, RUNS)
+    angle = 2.0 * np.pi * (way + HALF * turn) / PERIOD + phase[run][:, None]
+    asked = rng.normal(size=way.shape) + size * np.cos(angle)
+    gone, turned = way[:, 0], turn[:, 0]
+    own = [np.flatnonzero(run == k) for k in range(RUNS)]
+    return _Seen(asked, way - gone[:, None], turn - turned[:, None], gone, turned, own)
+
+
+def path() -> Path:
+    return Path({}, {}, None, None, None, None, None, np.full((1, 1), STEP), None)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_pattern_in_noise_is_found_with_its_period_and_its_place(seed):
+    found = _strongest(seen_by(np.random.default_rng(seed), 0.7), path(), 1.3 * HALF, 1.0)
+    assert abs(found.period - PERIOD) < 0.02 * PERIOD
+    assert abs(found.half_track - HALF) < 0.1 * HALF
+    assert found.power > found.by_chance
+
+
+def test_noise_alone_hardly_brings_more_than_it_may_by_chance():
+    seen = [seen_by(np.random.default_rng(100 + seed), 0.0) for seed in range(20)]
+    found = [_strongest(each, path(), 1.3 * HALF, 1.0) for each in seen]
+    over = np.array([each.power - each.by_chance for each in found])
+    assert np.sum(over > 0.0) <= 4
+    assert over.max() < 5.0
+    # nor is the price far too high: the patterns that are tried are not all independent
+    assert np.median(over) > -8.0
+
+
+def test_the_power_of_patterns_is_what_a_plain_sum_says():
+    seen = seen_by(np.random.default_rng(5), 0.5)
+    k, q, more_k, more_q = 31.0, np.array([2.0, 2.4]), np.array([-0.2, 0.1]), np.array([0.0, 0.05, 0.1])
+    waves = _waves(seen.turn, q) * _waves(seen.turned, q)[:, None]
+    found = _powers(seen, k, waves, _waves(seen.gone, more_k), _waves(seen.turned, more_q))
+    for i, j, m in np.ndindex(found.shape):
+        angle = k * (seen.gone[:, None] + seen.way) + q[j] * (seen.turned[:, None] + seen.turn)
+        each = np.sum(seen.asked * np.exp(1j * angle), axis=1)
+        moved = each * np.exp(1j * (more_k[i] * seen.gone + more_q[m] * seen.turned))
+        plain = sum(abs(moved[own].sum()) ** 2 / np.sum(np.abs(each[own]) ** 2) for own in seen.runs)
+        assert abs(found[i, j, m] - plain) < 1e-4 * plain
+
+
+def test_steps_tell_patterns_apart_at_the_end_of_a_run():
+    seen = seen_by(np.random.default_rng(6), 0.0)
+    step, more = _steps(seen, seen.way, seen.gone)
+    rates = np.sort(np.add.outer(step * np.arange(5), more).ravel())
+    wide = max(np.ptp(seen.gone[own]) for own in seen.runs)
+    np.testing.assert_allclose(np.diff(rates), np.diff(rates)[0])
+    assert np.diff(rates)[0] * wide <= wheel_angle.APART
+
+
+def test_a_closed_curve_ends_where_it_begins():
+    at = np.linspace(-np.pi, np.pi, 10)
+    rows = np.array([0.5, *np.ones(8), 0.5])  # half as many lie nearest to each end
+    stiff = precision((at,), rows[:, None], closed=True)
+    for shape, free in ((np.cos(at), True), (at, False), (np.ones(10), False)):
+        cost = shape @ stiff @ shape / (shape @ shape)
+        assert (cost < 1.0) == free, cost
