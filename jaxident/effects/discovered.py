@@ -12,9 +12,10 @@ v; a wheel that is not round rolls by its speed times a curve of its angle, whic
 Both integrators take laws from their settings (`with_laws`), under one name that no effect of the catalogue has.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 
 from jaxident.array_types import Array, Pose, Wheels
@@ -70,7 +71,7 @@ def rolled(settings: Mapping[str, Any], drive: Physical, now: Motion, here: Here
     if DISCOVERED not in settings:
         return None
     laws: Laws = settings[DISCOVERED]["laws"]
-    more = force(drive, _by_wheel(laws, ROLLINGS, drive, now, here))
+    more = _if_any(laws, ROLLINGS, lambda: force(drive, _by_wheel(laws, ROLLINGS, drive, now, here)))
     return Force(more.along / drive.rate[0], more.heading / drive.rate[1])
 
 
@@ -79,9 +80,22 @@ def pushed(settings: Mapping[str, Any], drive: Physical, now: Motion, here: Here
     if DISCOVERED not in settings:
         return None
     laws: Laws = settings[DISCOVERED]["laws"]
-    wheels = force(drive, _by_wheel(laws, PUSHES, drive, now, here))
-    whole = _added(laws, _shared(now, here))
-    return Force(_sum(laws, ALONG, whole) + wheels.along, _sum(laws, HEADING, whole) + wheels.heading)
+
+    def of_robot() -> Force:
+        added = _added(laws, _shared(now, here))
+        return Force(_sum(laws, ALONG, added), _sum(laws, HEADING, added))
+
+    wheels = _if_any(laws, (WHEELS, *PUSHES), lambda: force(drive, _by_wheel(laws, PUSHES, drive, now, here)))
+    robot = _if_any(laws, (ALONG, HEADING), of_robot)
+    return Force(robot.along + wheels.along, robot.heading + wheels.heading)
+
+
+def _if_any(laws: Laws, acts: tuple[str, ...], what: Callable[[], Any]) -> Any:
+    """What laws add to some of ACTS, and 0 where none of them does: most robots' laws act at one place, and what they
+    would add elsewhere cost most of a prediction."""
+    nothing = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), jax.eval_shape(what))
+    there = jnp.isin(laws.act, jnp.array([list(ACTS).index(act) for act in acts])).any()
+    return jax.lax.cond(there, what, lambda: nothing)
 
 
 def _by_wheel(laws: Laws, acts: tuple[str, ...], drive: Physical, now: Motion, here: Here) -> Wheels:
@@ -100,7 +114,7 @@ def sideways(settings: Mapping[str, Any], now: Motion, here: Here) -> Array:
     if DISCOVERED not in settings:
         return 0.0
     laws: Laws = settings[DISCOVERED]["laws"]
-    return _sum(laws, SIDEWAYS, _added(laws, _shared(now, here)))
+    return _if_any(laws, (SIDEWAYS,), lambda: _sum(laws, SIDEWAYS, _added(laws, _shared(now, here))))
 
 
 def shifted(settings: Mapping[str, Any], pose: Pose, true: Pose) -> Pose:
@@ -109,8 +123,12 @@ def shifted(settings: Mapping[str, Any], pose: Pose, true: Pose) -> Pose:
         return pose
     laws: Laws = settings[DISCOVERED]["laws"]
     sine, cosine = sin_cos(true.theta)
-    error = _added(laws, {"1": jnp.ones_like(true.x), "heading": wrap(true.theta), "x": true.x, "y": true.y})
-    ahead, left, turn = (_sum(laws, act, error) for act in BY_CAMERA)
+
+    def error() -> tuple[Array, ...]:
+        added = _added(laws, {"1": jnp.ones_like(true.x), "heading": wrap(true.theta), "x": true.x, "y": true.y})
+        return tuple(_sum(laws, act, added) for act in BY_CAMERA)
+
+    ahead, left, turn = _if_any(laws, BY_CAMERA, error)
     return Pose(pose.x + ahead * cosine - left * sine, pose.y + ahead * sine + left * cosine, pose.theta + turn)
 
 

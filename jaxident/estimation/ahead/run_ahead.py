@@ -19,7 +19,7 @@ from jaxident.estimation.ahead.camera_noise import noise_for
 from jaxident.estimation.ahead.filtered_state import Run, filter_and_run
 from jaxident.estimation.ahead.parameter_spread import directions
 from jaxident.estimation.ahead.stretches import AXES, Starts, Stretch, cut_stretches, until_last_start
-from jaxident.estimation.ahead.wheel_phase import followed, phases_of
+from jaxident.estimation.ahead.wheel_phase import closer, followed, phases_of
 from jaxident.estimation.increments.observations import blind, repeats
 from jaxident.estimation.poses.ways import ways
 from jaxident.log import Log
@@ -118,13 +118,14 @@ def _phases(
     anchors, own = np.unique(followed(starts), return_inverse=True)
     part = jax.tree.map(lambda axis, leaf: np.take(leaf, anchors, axis), AXES, stretch)
 
-    def misfit(phase: Array, acting: Sequence[int]) -> np.ndarray:
-        found = run(_silent(model, set(by_angle(model)) - set(acting)), phase, part)
+    def misfit(stretch: Stretch, phase: Array, acting: Sequence[int]) -> np.ndarray:
+        found = run(_silent(model, set(by_angle(model)) - set(acting)), phase, stretch)
         return found.innovation[: first + 1].sum(axis=0)
 
-    phase, deviation = phases_of(misfit, by_angle(model), (MOST_LAWS, len(anchors)))
+    phase, _ = phases_of(partial(misfit, part), by_angle(model), (MOST_LAWS, len(anchors)))
     gone = ways(log.runs())[:, starts.run, starts.row - first + stretch.first]
-    return phase[:, own] + laws.turn @ (gone - gone[:, anchors[own]]), deviation[:, own]
+    phase = phase[:, own] + laws.turn @ (gone - gone[:, anchors[own]])
+    return closer(partial(misfit, stretch), by_angle(model), phase)
 
 
 def _silent(model: Model, laws: Collection[int]) -> Model:

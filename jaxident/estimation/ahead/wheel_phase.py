@@ -8,61 +8,67 @@ from jaxident.array_types import Array
 from jaxident.estimation.ahead.stretches import Starts
 
 GRID = 12
-"""Angles that are tried, round the circle; a parabola through the best one and its neighbours gives the rest."""
-ZOOMS, CLOSER = 2, 4.0
-"""Times that three angles closer together are tried, and how much closer. No others were tried."""
+"""Angles that are tried, round the circle."""
+CLOSER = 3.0
+"""How much closer together three angles are that are tried about the best one. No other was tried."""
 APART = 100
-"""Rows between two starts at which phases are looked for, half of what the filter takes in. With all starts a
-prediction took five times as long."""
+"""Rows between two starts at which the whole circle is tried, half of what the filter takes in. From one to the next
+the poses tell how far the wheels have turned, and three angles about that are tried at each start."""
 UNKNOWN = np.pi / np.sqrt(3.0)
 """Deviation [rad] of an angle of which nothing is known."""
 
+Misfit = Callable[[Array, Sequence[int]], Array]
+"""Sums of squares (starts,) with wheels at some phases (laws, starts), some of the laws acting."""
 
-def phases_of(misfit: Callable[[Array, Sequence[int]], Array], laws: Sequence[int], shape: tuple[int, int]) -> tuple:
-    """Phases (laws, starts) [rad], 0 for laws not in `laws`, and their deviations [rad].
 
-    misfit(phases, acting): sums of squares (starts,) with some laws acting; shape: laws, starts. Each law is looked for
-    by itself first, and where there are several, once more beside the others.
-    """
-    phase, deviation = np.zeros(shape), np.zeros(shape)
-    rounds = [(k, [k]) for k in laws] + [(k, list(laws)) for k in laws if len(laws) > 1]
-    for k, acting in rounds:
-        phase[k], deviation[k] = _best(misfit, phase, k, acting)
+def phases_of(misfit: Misfit, laws: Sequence[int], shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """Phases (laws, starts) [rad], 0 for laws not in `laws`, and their deviations [rad]; shape: laws, starts. Each law
+    is looked for by itself first, and where there are several, once more beside the others."""
+    phase, deviation = np.zeros(shape), np.full(shape, UNKNOWN)
+    for k, acting in [(k, [k]) for k in laws] + [(k, list(laws)) for k in laws if len(laws) > 1]:
+        step = 2.0 * np.pi / GRID
+        whole = _squares(misfit, phase, k, acting, step * np.arange(GRID))
+        phase[k] = step * whole.argmin(axis=0)
+        phase[k], deviation[k] = _vertex(misfit, phase, k, acting, step)
+        phase[k], deviation[k] = _vertex(misfit, phase, k, acting, step / CLOSER)
+    return phase, deviation
+
+
+def closer(misfit: Misfit, laws: Sequence[int], phase: Array) -> tuple[np.ndarray, np.ndarray]:
+    """Phases (laws, starts) that fit best near some, and their deviations [rad]."""
+    phase, deviation = np.array(phase), np.full(phase.shape, UNKNOWN)
+    for k in laws:
+        phase[k], deviation[k] = _vertex(misfit, phase, k, laws, 2.0 * np.pi / GRID / CLOSER)
     return phase, deviation
 
 
 def followed(starts: Starts) -> np.ndarray:
-    """Of each start the number of that one, itself or before it in its run, whose phases it goes on from (starts,).
-
-    From one to the next lie APART rows at least; between them the poses tell how far the wheels have turned."""
+    """Of each start the number of that one, itself or before it in its run, whose phases it goes on from (starts,);
+    from one to the next of these lie APART rows at least."""
     own = np.arange(len(starts.row))
     for run in np.unique(starts.run):
+        here = np.flatnonzero(starts.run == run)
         last = -1
-        for k in np.flatnonzero(starts.run == run)[np.argsort(starts.row[starts.run == run], kind="stable")]:
+        for k in here[np.argsort(starts.row[here], kind="stable")]:
             if last < 0 or starts.row[k] - starts.row[last] >= APART:
                 last = k
             own[k] = last
     return own
 
 
-def _best(misfit, phase: Array, law: int, acting: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
-    """The phase (starts,) of one law that fits best, and its deviation."""
-
-    def squares(angles: Iterable[Array]) -> np.ndarray:
-        of_law = (np.arange(len(phase)) == law)[:, None]
-        return np.array([misfit(np.where(of_law, angle, phase), acting) for angle in angles])
-
-    step = 2.0 * np.pi / GRID
-    whole = squares(step * np.arange(GRID))
-    at = whole.argmin(axis=0)
-    best, bend = _vertex(step * at, step, *(np.take_along_axis(whole, (at + k)[None] % GRID, 0)[0] for k in (-1, 0, 1)))
-    for _ in range(ZOOMS):
-        step = step / CLOSER
-        best, bend = _vertex(best, step, *squares([best - step, best, best + step]))
-    return best, np.minimum(np.sqrt(2.0 / bend), UNKNOWN)
+def _squares(misfit: Misfit, phase: Array, law: int, acting: Sequence[int], angles: Iterable[Array]) -> np.ndarray:
+    """Sums of squares (angles, starts) with the wheel of one law at some angles."""
+    of_law = (np.arange(len(phase)) == law)[:, None]
+    return np.array([misfit(np.where(of_law, angle, phase), acting) for angle in angles])
 
 
-def _vertex(middle: Array, step: float, before: Array, here: Array, after: Array) -> tuple[np.ndarray, np.ndarray]:
-    """Where a parabola through three values is least, at most a step away, and its second derivative."""
+def _vertex(
+    misfit: Misfit, phase: Array, law: int, acting: Sequence[int], step: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Phase (starts,) of one law where a parabola through three values, a step apart, is least, at most a step away,
+    and its deviation."""
+    middle = phase[law]
+    before, here, after = _squares(misfit, phase, law, acting, (middle - step, middle, middle + step))
     bend = np.maximum(before - 2.0 * here + after, 1e-12)
-    return middle + step * np.clip(0.5 * (before - after) / bend, -1.0, 1.0), bend / step**2
+    best = middle + step * np.clip(0.5 * (before - after) / bend, -1.0, 1.0)
+    return best, np.minimum(step * np.sqrt(2.0 / bend), UNKNOWN)

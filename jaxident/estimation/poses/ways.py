@@ -17,8 +17,10 @@ def ways(runs: list[Log]) -> np.ndarray:
             continue
         x, y, theta = pose[:, seen]
         turn = np.cumsum((np.diff(theta, prepend=theta[0]) + np.pi) % (2.0 * np.pi) - np.pi)
-        middle = theta[0] + turn - 0.5 * np.diff(turn, prepend=0.0)
+        half = 0.5 * np.diff(turn, prepend=0.0)
+        middle = theta[0] + turn - half
         along = np.diff(x, prepend=x[0]) * np.cos(middle) + np.diff(y, prepend=y[0]) * np.sin(middle)
+        along = along / np.sinc(half / np.pi)  # an arc is longer than its chord
         last = np.maximum(np.searchsorted(seen, np.arange(found.shape[2]), side="right") - 1, 0)
         found[:, k] = np.stack([np.cumsum(along), turn])[:, last]
     return found

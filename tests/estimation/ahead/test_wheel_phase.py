@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from jaxident.estimation.ahead.wheel_phase import UNKNOWN, phases_of
+from jaxident.estimation.ahead.stretches import Starts
+from jaxident.estimation.ahead.wheel_phase import APART, UNKNOWN, closer, followed, phases_of
 
 TRUE = np.array([[0.3, 2.0, 5.1], [6.1, 1.2, 3.3]])
 SIZE = np.array([[40.0, 90.0, 200.0], [30.0, 10.0, 70.0]])
@@ -37,3 +38,18 @@ def test_several_laws_are_found_beside_each_other():
 def test_an_angle_that_nothing_tells_is_unknown():
     _, deviation = phases_of(lambda phase, acting: np.zeros(3), [0], (1, 3))
     np.testing.assert_allclose(deviation, UNKNOWN)
+
+
+def test_phases_near_the_best_ones_become_these():
+    phase, deviation = closer(squares, [0, 1], TRUE + np.array([[0.1, -0.1, 0.15], [0.0, 0.12, -0.08]]))
+    assert apart(phase, TRUE).max() < 0.02
+    np.testing.assert_allclose(deviation, np.sqrt(2.0 / SIZE), rtol=0.1)
+
+
+def test_a_start_goes_on_from_one_before_it_in_its_run():
+    row = np.array([20, 60, 20 + APART, 50, 300, 310])
+    run = np.array([0, 0, 0, 1, 1, 1])
+    np.testing.assert_array_equal(followed(Starts(run, row)), [0, 0, 2, 3, 4, 4])
+    order = np.array([5, 3, 1, 0, 4, 2])
+    found = followed(Starts(run[order], row[order]))
+    np.testing.assert_array_equal(order[found], np.array([0, 0, 2, 3, 4, 4])[order])
