@@ -42,7 +42,8 @@ from jaxident.robot.drive import Force, Physical, force, wheel_speeds
 
 class Here(NamedTuple):
     """What is held over a substep: position [m], session time [s], what drives the wheels [unit]; what the commands
-    left behind (`Past`), and the angles of the wheels that laws go by (laws, ...) [rad], None without laws."""
+    left behind (`Past`), and the angles of the wheels that laws go by (laws, ...) [rad], None without laws; sure: what
+    part of such a law is added (laws, ...)."""
 
     x: Any
     y: Any
@@ -50,6 +51,7 @@ class Here(NamedTuple):
     push: Wheels
     past: Any
     angles: Any
+    sure: Any = 1.0
 
 
 def with_laws(settings: Mapping[str, Any], laws: Laws | None) -> Mapping[str, Any]:
@@ -105,7 +107,8 @@ def _by_wheel(laws: Laws, acts: tuple[str, ...], drive: Physical, now: Motion, h
     for number, (act, n, m) in enumerate(zip(acts, speeds, here.push, strict=True)):
         known = shared | {"own speed": n, "own push": m} | {name: part[number] for name, part in past.items()}
         added = _added(laws, known | {ANGLE: wrap(here.angles)})
-        whole.append(_sum(laws, act, added) + (_sum(laws, WHEELS, added) if acts == PUSHES else 0.0))
+        own = _sum(laws, act, here.sure * added)
+        whole.append(own + _sum(laws, WHEELS, added) if acts == PUSHES else own)
     return Wheels(*whole)
 
 
@@ -137,6 +140,7 @@ def _shared(now: Motion, here: Here) -> dict[str, Array]:
     right, left = here.push
     sine, cosine = sin_cos(now.theta)
     return {"1": jnp.ones_like(now.v), "v": now.v, "w": now.w, "cos heading": cosine, "sin heading": sine,
+            "v cos heading": now.v * cosine, "v sin heading": now.v * sine,
             "heading": wrap(now.theta), "x": here.x, "y": here.y, "time": here.time,
             "push right": right, "push left": left, "since reversal": here.past.since}  # fmt: skip
 

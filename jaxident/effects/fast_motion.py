@@ -30,10 +30,12 @@ class Lag(NamedTuple):
 
 class Rolling(NamedTuple):
     """How both wheels turn beside the robot's own motion: by how much faster than the ground, for each effect that lets
-    them slide; and the angles of those that discovered laws go by (laws, ...) [rad], None without laws."""
+    them slide; the angles of those that discovered laws go by (laws, ...) [rad], None without laws; and the part of
+    these laws that is added (`Laws.sure`)."""
 
     excess: list[Array]
     angles: Any = None
+    sure: Any = 1.0
 
 
 class Row(NamedTuple):
@@ -65,9 +67,9 @@ def report(settings, x: Array, y: Array, theta: Array) -> Pose:
     return shifted(settings, seen(settings, true, fast=True), true)
 
 
-def rolling(like: Array, angles: Array | None = None) -> Rolling:
+def rolling(like: Array, angles: Array | None = None, sure: Any = 1.0) -> Rolling:
     """Of wheels that do not slide, at some angles."""
-    return Rolling([jnp.zeros_like(like)] * (2 * len(CHAIN["grip"])), angles)
+    return Rolling([jnp.zeros_like(like)] * (2 * len(CHAIN["grip"])), angles, sure)
 
 
 def advance_row(settings, drive: Physical, state: State, wheels: Rolling, row: Row, slip=(0.0, 0.0)):
@@ -81,7 +83,7 @@ def advance_row(settings, drive: Physical, state: State, wheels: Rolling, row: R
         lightness = functools.reduce(operator.mul, loads)
         push = _force(drive, row.mean[number]), _force(drive, row.slope[number])
         angles = turned(settings, wheels.angles, 0.5 * row.part * state.v, 0.5 * row.part * state.w)
-        here = Here(state.x, state.y, middle, Wheels(*row.mean[number]), row.past, angles)
+        here = Here(state.x, state.y, middle, Wheels(*row.mean[number]), row.past, angles, wheels.sure)
         state, wheels = _substep(settings, drive, state, wheels, push, slip, row.part, row.lags, lightness, here)
     return state, wheels
 
@@ -122,7 +124,7 @@ def _substep(
         way = way + part / 6.0 * weight * speed
     moved = State(x + part / 6.0 * x_rate, y + part / 6.0 * y_rate, heading, *end[1:])
     angles = turned(settings, wheels.angles, way, heading - theta)
-    return moved, Rolling([own.excess for pair in sliding for own in pair], angles)
+    return moved, Rolling([own.excess for pair in sliding for own in pair], angles, wheels.sure)
 
 
 def _force(drive: Physical, m) -> list[Array]:

@@ -24,7 +24,8 @@ class Laws(NamedTuple):
     values there (laws, knots, second knots). Without surfaces there is one second knot; a curve beside a surface has
     the same values at all of them. turn (laws, 2): how far the wheel of a law turns per metre of the robot's way
     [rad/m] and per radian of its turn, 0 where the wheel's angle does not matter; phase (laws, runs) [rad]: its angle
-    at the beginning, or (laws, 1) of runs that all begin alike."""
+    at the beginning, or (laws, 1) of runs that all begin alike; sure, of the same shape: the part that is added of what
+    such a law says, below 1 where the angle is uncertain."""
 
     act: Any
     times: Any
@@ -35,6 +36,7 @@ class Laws(NamedTuple):
     value: Any
     turn: Any
     phase: Any
+    sure: Any
 
 
 IDLE = Discovered(ALONG, "1", "v", np.arange(2.0), np.zeros(2))
@@ -56,7 +58,8 @@ def laws_of(laws: Sequence[Discovered], largest: float = 1.0, surfaces: bool | N
             for law in laws]  # fmt: skip
     act, times, signal, other = np.array(codes).T
     at, second_at, value = (np.stack(column) for column in zip(*rows, strict=True))
-    return Laws(act, times, signal, other, at, second_at, value, np.array(turn), np.zeros((MOST_LAWS, 1)))
+    return Laws(act, times, signal, other, at, second_at, value, np.array(turn), np.zeros((MOST_LAWS, 1)),
+                np.ones((MOST_LAWS, 1)))  # fmt: skip
 
 
 def _padded(law: Discovered, second: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -54,7 +54,7 @@ SIGNAL_WORDS = {
 OF_CAMERA = ("heading", "x", "y")
 """Signals that a camera's error may depend on."""
 TIMES = {"1": "", "v": "m/s", "w": "rad/s", "cos heading": "", "sin heading": "", "own push": UNIT,
-         "own speed": UNIT,
+         "own speed": UNIT, "v cos heading": "m/s", "v sin heading": "m/s",
          **dict.fromkeys(CHANGES, UNIT)}  # fmt: skip
 """What a curve may be multiplied with, and the unit."""
 

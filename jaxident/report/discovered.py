@@ -17,6 +17,7 @@ TIMES_WORDS = {
     "1": "", "v": "speed times ", "w": "turn rate times ", "own push": "push of that wheel times ",
     "own speed": "speed of that wheel times ",
     "cos heading": "the heading's cosine times ", "sin heading": "the heading's sine times ",
+    "v cos heading": "speed along x times ", "v sin heading": "speed along y times ",
     **{name: f"change of that wheel's command over {tau:g} s times " for name, tau in CHANGES.items()},
 }  # fmt: skip
 SEEN = (

@@ -60,6 +60,7 @@ LAWS = (
     ("acceleration along", "v", "since reversal", SINCE, -3.0 * np.exp(-SINCE / 0.4)),
     ("acceleration along", "v", "x", PUSHES[::2], SURFACE, None, "y", PUSHES[::2]),
     ("acceleration along", "sin heading", "x", PUSHES[::2], SURFACE, None, "y", PUSHES[::2]),
+    ("acceleration in heading", "v sin heading", "x", PUSHES[::2], 9.0 * SURFACE, None, "y", PUSHES[::2]),
     ("speed sideways", "v", "x", PUSHES[::2], 0.1 * SURFACE, None, "y", PUSHES[::2]),
     ("push of the right wheel", "own push", *AROUND, 0.13, 0.1),
     ("push of the left wheel", "1", *AROUND, 0.13, -0.1),

@@ -99,7 +99,8 @@ def path_of(fit: Solution, windows: Windows, laws: Laws | None = None) -> Path:
     signals = {"1": np.ones_like(v), "v": v, "w": w, "heading": heading, "x": x, "y": y, "time": time,
                "push right": push[..., 0], "push left": push[..., 1],
                "since reversal": np.asarray(past.since).T, "cos heading": np.cos(theta),
-               "sin heading": np.sin(theta)}  # fmt: skip
+               "sin heading": np.sin(theta), "v cos heading": v * np.cos(theta),
+               "v sin heading": v * np.sin(theta)}  # fmt: skip
     own = {"1": np.ones_like(push), "own speed": speeds, "own push": push}
     own |= {name: np.asarray(part).transpose(2, 0, 1) for name, part in remembered(past, axis=1).items()}
     seen = np.repeat(np.asarray(windows.seen).T, 3, axis=1)

@@ -34,9 +34,9 @@ curve, by the change."""
 NOMINAL = ("v", "w", "push right", "push left", "own speed", "own push")
 """Signals on which a force of the nominal robot depends, in a straight line."""
 FLOOR = ((ALONG, "1"), (ALONG, "v"), (ALONG, "cos heading"), (ALONG, "sin heading"), (HEADING, "1"), (HEADING, "w"),
-         (SIDEWAYS, "v"), (TURN, "1"))  # fmt: skip
+         (HEADING, "v cos heading"), (HEADING, "v sin heading"), (SIDEWAYS, "v"), (TURN, "1"))  # fmt: skip
 """What may differ from place to place on the floor: a pull, rolling, the slope along x and along y, twist, turning,
-drift, and the camera's heading."""
+what a nap turns a robot by that moves along x or y, drift, and the camera's heading."""
 
 
 class Kind(NamedTuple):

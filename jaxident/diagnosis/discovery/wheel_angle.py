@@ -25,7 +25,7 @@ SLOWEST, FASTEST = 0.7, np.pi
 a second on, a wheel of 2.4 m round of a slow robot was not found; no others were tried."""
 PLACES = (0.3, 1.2)
 """Half track over what gains and rates say: less than one where wheels slide in turns. No others were tried."""
-APART = 0.7
+APART = 1.0
 """Angle [rad] at the end of a window, or of a run, from one k or q to the next. No other was tried."""
 ZOOMS, AROUND = 3, np.linspace(-1.0, 1.0, 7)
 """Times that the search looks closer, and where then, in steps of the grid before; the next grid is half as wide. No

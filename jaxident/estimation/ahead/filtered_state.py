@@ -78,8 +78,11 @@ def filter_and_run(
     size = 5 + 2 * (noise.slip_time is not None) + 3 * (noise.correlation_time is not None)
     none = jnp.zeros((size, t.shape[1]))
     nothing, wide = jnp.zeros((size, *none.shape)), _wide(noise)
-    phase = None if laws is None else jnp.broadcast_to(laws.phase, (len(laws.phase), t.shape[1]))
-    begin = _Belief(none, nothing, nothing, rolling(none[0], phase))
+    phase: Array | None = None
+    sure: Array = 1.0
+    if laws is not None:
+        phase, sure = (jnp.broadcast_to(part, (len(part), t.shape[1])) for part in (laws.phase, laws.sure))
+    begin = _Belief(none, nothing, nothing, rolling(none[0], phase, sure))
 
     def body(belief, now):
         k, row, own, pose, seen, jolt = now
@@ -233,9 +236,12 @@ def _moved(settings, drive, noise: Noise, mean: Array, wheels: Rolling, row: Row
     slip = mean[5:7] if noise.slip_time is not None else jnp.zeros_like(mean[:2])
     nudge = jnp.diag(jnp.array(STEPS)) @ jnp.eye(5, 6, 1)
     theta, v, w, *slip = (a + d[:, None] for a, d in zip((theta, v, w, *slip), nudge, strict=True))
-    angles = None if wheels.angles is None else wheels.angles[:, None]
-    lanes, after = advance_row(settings, drive, State(x, y, theta, v, w), wheels._replace(angles=angles), row, slip)
+    before = wheels
+    if wheels.angles is not None:
+        before = wheels._replace(angles=wheels.angles[:, None], sure=wheels.sure[:, None])
+    lanes, after = advance_row(settings, drive, State(x, y, theta, v, w), before, row, slip)
     lanes = jnp.stack([jnp.broadcast_to(part, theta.shape) for part in lanes])
     slopes = (lanes[:, 1:] - lanes[:, :1]) / jnp.array(STEPS)[:, None]
     excess = [jnp.broadcast_to(one, theta.shape)[0] for one in after.excess]
-    return lanes[:, 0], slopes, Rolling(excess, None if angles is None else after.angles[:, 0])
+    angles = None if after.angles is None else after.angles[:, 0]
+    return lanes[:, 0], slopes, wheels._replace(excess=excess, angles=angles)

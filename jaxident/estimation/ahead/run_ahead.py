@@ -84,21 +84,25 @@ def run_ahead(model: Model, log: Log, starts: Starts, horizon: int, *, burn_in: 
                             past=bool(model.discovered))  # fmt: skip
     ahead = slice(first + 1, first + 1 + horizon)
 
-    def run(robot: Model, phase: Array, stretch: Stretch) -> Run:
+    def run(robot: Model, phase: Array, stretch: Stretch, sure: Array | None = None) -> Run:
         laws = laws_of(robot.discovered)
-        laws = None if laws is None else laws._replace(phase=phase)
+        if laws is not None:
+            laws = laws._replace(phase=phase, sure=np.ones(phase.shape) if sure is None else sure)
         return _in_blocks(vector_of(robot), laws, noise, lost, stretch, first)
 
     phase, deviation = _phases(run, model, log, starts, stretch, first)
-    found, phase, stretch, run_up = _filtered(partial(run, model), phase, stretch, ahead, burn_in)
+    sure = np.exp(-0.5 * deviation**2)  # the mean of a cosine whose angle is so uncertain
+    found, phase, stretch, run_up = _filtered(partial(run, model, sure=sure), phase, stretch, ahead, burn_in)
     pose, begin, slip = (np.moveaxis(leaf[ahead], -1, 0) for leaf in found[:3])
-    moved = [(other, 0.0, size) for other, size in directions(model)]
+
+    def there(robot: Model, phase: Array, sure: Array) -> np.ndarray:
+        return np.moveaxis(run(robot, phase, stretch, sure).pose[ahead], -1, 0)
+
+    slopes = [_less(there(other, phase, sure), pose) / size for other, size in directions(model)]
     for k in by_angle(model):
-        moved.append((model, ANGLE_STEP * (np.arange(MOST_LAWS) == k)[:, None], ANGLE_STEP / deviation[k]))
-    slopes = [
-        _less(np.moveaxis(run(other, phase + turn, stretch).pose[ahead], -1, 0), pose) / np.reshape(size, (-1, 1, 1))
-        for other, turn, size in moved
-    ]
+        whole, turn = np.ones(sure.shape), ANGLE_STEP * (np.arange(MOST_LAWS) == k)[:, None]
+        slope = _less(there(model, phase + turn, whole), there(model, phase, whole)) / ANGLE_STEP
+        slopes.append(slope * np.minimum(deviation[k], 1.0)[:, None, None])  # an angle that may be any: as a sine's
     return Ahead(pose, begin, slip, np.array(slopes).reshape(-1, *pose.shape), run_up)
 
 
@@ -108,7 +112,7 @@ def by_angle(model: Model) -> list[int]:
 
 
 def _phases(
-    run: Callable[[Model, Array, Stretch], Run], model: Model, log: Log, starts: Starts, stretch: Stretch, first: int
+    run: Callable[..., Run], model: Model, log: Log, starts: Starts, stretch: Stretch, first: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Phases (laws, starts) of the wheels that laws go by where the filter of each start begins, and their deviations
     [rad]; first: row of the starts in their stretches."""
@@ -118,9 +122,11 @@ def _phases(
     anchors, own = np.unique(followed(starts), return_inverse=True)
     part = jax.tree.map(lambda axis, leaf: np.take(leaf, anchors, axis), AXES, stretch)
 
-    def misfit(stretch: Stretch, phase: Array, acting: Sequence[int]) -> np.ndarray:
-        found = run(_silent(model, set(by_angle(model)) - set(acting)), phase, stretch)
-        return found.innovation[: first + 1].sum(axis=0)
+    def misfit(stretch: Stretch, phases: Array, acting: Sequence[int]) -> np.ndarray:
+        count = len(phases)  # side by side, so that blocks are full
+        many = jax.tree.map(lambda axis, leaf: np.concatenate([leaf] * count, axis), AXES, stretch)
+        found = run(_silent(model, set(by_angle(model)) - set(acting)), np.concatenate(phases, axis=-1), many)
+        return found.innovation[: first + 1].sum(axis=0).reshape(count, -1)
 
     phase, _ = phases_of(partial(misfit, part), by_angle(model), (MOST_LAWS, len(anchors)))
     gone = ways(log.runs())[:, starts.run, starts.row - first + stretch.first]
@@ -145,7 +151,7 @@ def _less(pose: Array, other: Array) -> np.ndarray:
 
 
 def _filtered(
-    run: Callable[[Array, Stretch], Run], phase: Array, stretch: Stretch, ahead: slice, burn_in: int
+    run: Callable[..., Run], phase: Array, stretch: Stretch, ahead: slice, burn_in: int
 ) -> tuple[Run, Array, Stretch, Array]:
     """The filter and the free run of every stretch, over the rows `ahead`; where it does not converge, a run-up of the
     commands from rest, laid on the last pose; phases (laws, stretches) and stretches as they were run, and where they
@@ -180,7 +186,7 @@ def _in_blocks(vector: Array, laws: Laws | None, noise: Noise, lost: float | Non
     for begin in range(0, count, LANES):
         chosen = np.minimum(np.arange(begin, begin + LANES), count - 1)
         block = jax.tree.map(lambda axis, leaf, chosen=chosen: np.take(leaf, chosen, axis), AXES, stretch)
-        own = None if laws is None else laws._replace(phase=laws.phase[:, chosen])
+        own = None if laws is None else laws._replace(phase=laws.phase[:, chosen], sure=laws.sure[:, chosen])
         blocks.append((vector, own, noise, lost, block, first))
     parts = [jax.tree.map(np.asarray, block) for block in in_parallel(_run_block, blocks, ahead=False)]
     return jax.tree.map(lambda *leaves: np.concatenate(leaves, axis=-1)[..., :count], *parts)

@@ -12,13 +12,13 @@ GRID = 12
 CLOSER = 3.0
 """How much closer together three angles are that are tried about the best one. No other was tried."""
 APART = 100
-"""Rows between two starts at which the whole circle is tried, half of what the filter takes in. From one to the next
-the poses tell how far the wheels have turned, and three angles about that are tried at each start."""
+"""Rows at most between two starts at which the whole circle is tried, half of what the filter takes in. From one to the
+next the poses tell how far the wheels have turned, and three angles about that are tried at each start."""
 UNKNOWN = np.pi / np.sqrt(3.0)
 """Deviation [rad] of an angle of which nothing is known."""
 
 Misfit = Callable[[Array, Sequence[int]], Array]
-"""Sums of squares (starts,) with wheels at some phases (laws, starts), some of the laws acting."""
+"""Sums of squares (n, starts) with wheels at each of some phases (n, laws, starts), some of the laws acting."""
 
 
 def phases_of(misfit: Misfit, laws: Sequence[int], shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
@@ -43,14 +43,14 @@ def closer(misfit: Misfit, laws: Sequence[int], phase: Array) -> tuple[np.ndarra
 
 
 def followed(starts: Starts) -> np.ndarray:
-    """Of each start the number of that one, itself or before it in its run, whose phases it goes on from (starts,);
-    from one to the next of these lie APART rows at least."""
+    """Of each start the number of that one, itself or before it in its run, whose phases it goes on from (starts,): one
+    that knew two thirds of as many rows, and stands less than APART before it."""
     own = np.arange(len(starts.row))
     for run in np.unique(starts.run):
         here = np.flatnonzero(starts.run == run)
         last = -1
         for k in here[np.argsort(starts.row[here], kind="stable")]:
-            if last < 0 or starts.row[k] - starts.row[last] >= APART:
+            if last < 0 or starts.row[k] - starts.row[last] >= min(APART, starts.row[last] / 2):
                 last = k
             own[k] = last
     return own
@@ -59,7 +59,7 @@ def followed(starts: Starts) -> np.ndarray:
 def _squares(misfit: Misfit, phase: Array, law: int, acting: Sequence[int], angles: Iterable[Array]) -> np.ndarray:
     """Sums of squares (angles, starts) with the wheel of one law at some angles."""
     of_law = (np.arange(len(phase)) == law)[:, None]
-    return np.array([misfit(np.where(of_law, angle, phase), acting) for angle in angles])
+    return misfit(np.stack([np.where(of_law, angle, phase) for angle in angles]), acting)
 
 
 def _vertex(
