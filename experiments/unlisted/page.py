@@ -43,7 +43,8 @@ def law_of(law: dict) -> Discovered:
     at = np.unique([point["at"] for point in points])
     value, deviation = (np.array([point[key] for point in points]) for key in ("value", "standard_deviation"))
     if len(signals) == 1:
-        return Discovered(law["acts_on"], law["times"], *signals, at, value, deviation)
+        turning = {key: law[key] for key in ("period", "half_track")}
+        return Discovered(law["acts_on"], law["times"], *signals, at, value, deviation, **turning)
     second = np.unique([point["second_at"] for point in points])
     shape = len(at), len(second)
     return Discovered(law["acts_on"], law["times"], signals[0], at, value.reshape(shape), deviation.reshape(shape),

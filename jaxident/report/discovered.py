@@ -9,7 +9,7 @@ from jaxident.diagnosis.account.discovered import Shown
 from jaxident.diagnosis.diagnose import Diagnosis
 from jaxident.diagnosis.discovery.forms import PATCH, beyond
 from jaxident.diagnosis.discovery.kinds import Kind
-from jaxident.effects.law_kinds import CHANGES, SIGNAL_WORDS
+from jaxident.effects.law_kinds import ANGLE, CHANGES, SIGNAL_WORDS
 from jaxident.report.page import Figure, Section, Table
 from jaxident.report.words import number, percent, plain, together
 
@@ -25,6 +25,11 @@ SEEN = (
     "them. Each adds a curve of one signal, or a surface of two, at one place. The corrected model has them, and "
     "`predict`, `simulate`, `plan` and studies run them. Beyond the signals that these logs show, a law stays at its "
     "last value. That is a guess: `predict` warns where it is made, and is less sure there."
+)
+OF_WHEEL = (
+    "How a wheel stands when a run begins, no camera sees, and it differs from run to run. The angle of 0 is where the "
+    "law is largest. `predict` finds the angle in the poses before each start, and is less sure where there are few. "
+    "`simulate` draws one."
 )
 OF_CURVE = "Line: the curve; shade: two standard deviations; grey bars: how often the robot was there. "
 OF_MAP = (
@@ -70,7 +75,8 @@ def discovered(found: Diagnosis) -> list[Section]:
     ]  # fmt: skip
     table = Table(("acts on", "what is added", "share of the error", "probability by chance", "looks like"), rows)
     pictures = [_picture(shown) for shown in found.discovered]
-    return [Section("What was discovered", [SEEN, *pictures, table, *_other_forms(found), *_alike(found)])]
+    wheels = [OF_WHEEL] if any(shown.law.signal == ANGLE for shown in found.discovered) else []
+    return [Section("What was discovered", [SEEN, *wheels, *pictures, table, *_other_forms(found), *_alike(found)])]
 
 
 def _picture(shown: Shown) -> Figure:

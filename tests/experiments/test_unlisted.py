@@ -21,6 +21,8 @@ from jaxident.robot.model import Discovered
 
 KNOTS = np.linspace(-1.0, 1.0, 4)
 SURFACE = Discovered("acceleration along", "v", "x", KNOTS, np.arange(16.0).reshape(4, 4), np.ones((4, 4)), "y", KNOTS)
+OF_A_WHEEL = Discovered("push of the left wheel", "1", "own angle", KNOTS, KNOTS**2, np.ones(4), period=0.1,
+                        half_track=-0.2)  # fmt: skip
 CURVE = Discovered("acceleration along", "1", "v", KNOTS, KNOTS**2, np.ones(4))
 
 
@@ -47,12 +49,13 @@ def test_an_effect_moves_the_robot(kind):
 
 
 def test_a_law_reads_back_from_what_a_diagnosis_tells():
-    for law in (SURFACE, CURVE):
+    for law in (SURFACE, CURVE, OF_A_WHEEL):
         kind = Kind(law.acts_on, law.times, law.signal, law.second_signal)
         back = law_of(law_to_dict(Shown(kind, law, tuple([1] * law.value.size), 0.1, 0.01, None)))
         assert (back.signal, back.second_signal, back.times) == (law.signal, law.second_signal, law.times)
         np.testing.assert_array_equal(back.value, law.value)
         np.testing.assert_array_equal(back.at, law.at)
+        assert (back.period, back.half_track) == (law.period, law.half_track)
 
 
 def test_table_and_page_tell_of_every_robot(tmp_path):
