@@ -1,15 +1,27 @@
 """What comes once per turn of a wheel: whether it is found, and how much is found by chance."""
 
+from typing import Any, NamedTuple
+
 import numpy as np
 import pytest
 
 from jaxident.diagnosis.discovery import wheel_angle
 from jaxident.diagnosis.discovery.candidates import Path
 from jaxident.diagnosis.discovery.curves import precision
-from jaxident.diagnosis.discovery.wheel_angle import _powers, _Seen, _steps, _strongest, _waves
+from jaxident.diagnosis.discovery.wheel_angle import _powers, _Seen, _steps, _strongest, _waves, turnings
+from jaxident.diagnosis.fit.refit import Data, Solution
+from jaxident.diagnosis.motion.linear import Linear
+from jaxident.diagnosis.motion.responses import Responses
 
 RUNS, WINDOWS, ROWS, STEP = 3, 12, 30, 0.05
 PERIOD, HALF = 0.19, 0.075
+
+
+class Stub(NamedTuple):
+    """What the search asks of windows."""
+
+    run: Any
+    session: Any
 
 
 def seen_by(rng, size: float) -> _Seen:
@@ -77,3 +89,23 @@ def test_a_closed_curve_ends_where_it_begins():
     for shape, free in ((np.cos(at), True), (at, False), (np.ones(10), False)):
         cost = shape @ stiff @ shape / (shape @ shape)
         assert (cost < 1.0) == free, cost
+
+
+def test_a_wheel_that_does_nothing_is_left_out():
+    """Of a robot that coasts no half track is known."""
+    gain = np.array([[0.0, 0.8], [0.0, -9.0]])
+    seen = seen_by(np.random.default_rng(7), 0.0)
+    way, turn = seen.gone[:, None] + seen.way, seen.turned[:, None] + seen.turn
+    own = {name: np.ones((*way.shape, 2)) for name in ("1", "own push", "own speed")}
+    step = np.full(way.shape, STEP)
+    run = np.repeat(np.arange(RUNS), WINDOWS)
+    whole = Path({}, own, gain, np.array([3.0, 5.0]), None, way, turn, step, run)
+    rng = np.random.default_rng(8)
+    answer = np.cumsum(rng.normal(size=(len(run), ROWS, ROWS)), axis=1)
+    linear = Linear(None, None, rng.normal(size=(len(run), ROWS, 5)))
+    data = Data(Stub(run, np.zeros(RUNS)), np.broadcast_to(np.eye(ROWS), (len(run), ROWS, ROWS)))
+    base = rng.normal(size=(len(run), ROWS, 3))
+    found = turnings(data, Solution(None, None, [], linear, 0.0, None, 0), base, whole, Responses(answer, answer, None))
+    assert [kind.acts_on for kind, _ in found] == ["push of the left wheel"] * 2 + ["rolling of the left wheel"]
+    assert all(np.isfinite([turning.period, turning.half_track]).all() for _, turning in found)
+    assert all(turning.half_track < 0.0 for _, turning in found)
