@@ -1,7 +1,6 @@
 """From a physical model and a log to filtered starts and free runs, in blocks of stretches of one shape."""
 
-import dataclasses
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -47,8 +46,9 @@ ANGLE_STEP = 1e-3
 
 class Ahead(NamedTuple):
     """Predicted rows: pose (starts, horizon, 3); covariances (starts, horizon, 3, 3) of it by what is not known at the
-    start and by slip since; its slopes by the parameters, a deviation's worth of each independent direction
-    (directions, starts, horizon, 3); run_up (starts,): whether a start comes from a run-up of earlier commands."""
+    start and by slip since; its slopes by the parameters, a deviation's worth of each independent direction, and by the
+    angles of wheels that laws go by (directions, starts, horizon, 3); run_up (starts,): whether a start comes from a
+    run-up of earlier commands."""
 
     pose: Any
     start: Any
@@ -125,22 +125,15 @@ def _phases(
     def misfit(stretch: Stretch, phases: Array, acting: Sequence[int]) -> np.ndarray:
         count = len(phases)  # side by side, so that blocks are full
         many = jax.tree.map(lambda axis, leaf: np.concatenate([leaf] * count, axis), AXES, stretch)
-        found = run(_silent(model, set(by_angle(model)) - set(acting)), np.concatenate(phases, axis=-1), many)
+        phases = np.concatenate(phases, axis=-1)
+        acts = np.isin(np.arange(MOST_LAWS), acting)[:, None] * np.ones(phases.shape)
+        found = run(model, phases, many, acts)
         return found.innovation[: first + 1].sum(axis=0).reshape(count, -1)
 
     phase, _ = phases_of(partial(misfit, part), by_angle(model), (MOST_LAWS, len(anchors)))
-    gone = ways(log.runs())[:, starts.run, starts.row - first + stretch.first]
+    gone = ways(log.runs())[:, starts.run, np.maximum(starts.row - first + stretch.first, 0)]
     phase = phase[:, own] + laws.turn @ (gone - gone[:, anchors[own]])
     return closer(partial(misfit, stretch), by_angle(model), phase)
-
-
-def _silent(model: Model, laws: Collection[int]) -> Model:
-    """The model without what some of its laws add."""
-    laws_left = tuple(
-        dataclasses.replace(law, value=np.zeros_like(law.value)) if k in laws else law
-        for k, law in enumerate(model.discovered)
-    )
-    return dataclasses.replace(model, discovered=laws_left)
 
 
 def _less(pose: Array, other: Array) -> np.ndarray:
