@@ -28,15 +28,19 @@ PLACES = (0.3, 1.2)
 APART = 1.0
 """Angle [rad] at the end of a window, or of a run, from one k or q to the next. With 0.7 the same was found on three
 robots."""
-ZOOMS, AROUND = 3, np.linspace(-1.0, 1.0, 7)
+ZOOMS, AROUND = 4, np.linspace(-2.0, 2.0, 9)
 """Times that the search looks closer, and where then, in steps of the grid before; the next grid is half as wide. No
 others were tried."""
 
 
 class _Seen(NamedTuple):
-    """Of a kind of law: what the poses ask for in each row (windows, rows); way and turn since the window's first row
-    (windows, rows), and those of this row in its run (windows,); the windows of each run."""
+    """Of a kind of law: white answers of the poses to a unit in each row (windows, numbers, rows), and what is to be
+    explained (windows, numbers); what the poses ask for in each row (windows, rows), the product of both; way and turn
+    since the window's first row (windows, rows), and those of this row in its run (windows,); the windows of each
+    run."""
 
+    answers: Array
+    residual: Array
     asked: Array
     way: Array
     turn: Array
@@ -81,7 +85,7 @@ def _seen(data: Data, fit: Solution, residual: Array, path: Path, responses: Res
     asked = (answers.transpose(0, 2, 1) @ residual[..., None])[..., 0]
     gone, turned, run = path.way[:, 0], path.turn[:, 0], np.asarray(data.windows.run)
     runs = [np.flatnonzero(run == number) for number in range(len(data.windows.session))]
-    return _Seen(asked, path.way - gone[:, None], path.turn - turned[:, None], gone, turned, runs)
+    return _Seen(answers, residual, asked, path.way - gone[:, None], path.turn - turned[:, None], gone, turned, runs)
 
 
 def _strongest(seen: _Seen, path: Path, half: float, side: float) -> Turning:
@@ -102,8 +106,7 @@ def _strongest(seen: _Seen, path: Path, half: float, side: float) -> Turning:
         count += power.size
         i, j, m = np.unravel_index(power.argmax(), power.shape)
         best = max(best, (float(power[i, j, m]), k + more_k[i], side * (q_all[near][j] + more_q[m])))
-    k, q = _closer(seen, best, k_step / len(more_k), q_step / len(more_q))
-    phase = -np.angle(_sums(seen, np.array([k]), np.array([q]))[:, 0])
+    k, q, phase = _closer(seen, best, k_step / len(more_k), q_step / len(more_q))
     return Turning(2.0 * np.pi / k, q / k, phase, best[0], _by_chance(seen.runs, count))
 
 
@@ -135,24 +138,29 @@ def _powers(seen: _Seen, k: float, waves: Array, more_k: Array, more_q: Array) -
     return total
 
 
-def _sums(seen: _Seen, k: Array, q: Array) -> np.ndarray:
-    """Sums (runs, n) over each run of what patterns k (n,), q (n,) are asked for."""
-    angle = (seen.gone[:, None] + seen.way)[..., None] * k + (seen.turned[:, None] + seen.turn)[..., None] * q
-    each = np.sum(seen.asked[..., None] * np.exp(1j * angle), axis=1)
-    return np.stack([each[own].sum(axis=0) for own in seen.runs])
-
-
-def _closer(seen: _Seen, best: tuple[float, float, float], k_step: float, q_step: float) -> tuple[float, float]:
-    """k and q where the sums are largest near some k and q."""
+def _closer(seen: _Seen, best: tuple[float, float, float], k_step: float, q_step: float) -> tuple:
+    """k, q and phases (runs,) of the pattern that explains most near some k and q."""
     _, k, q = best
-    scale = np.array([np.sum(seen.asked[own] ** 2) for own in seen.runs])
-    scale = np.where(scale > 0.0, scale, 1.0)[:, None]
     for zoom in range(ZOOMS):
         grid = np.meshgrid(k + 0.5**zoom * k_step * AROUND, q + 0.5**zoom * q_step * AROUND)
         k_near, q_near = (part.ravel() for part in grid)
-        power = np.sum(np.abs(_sums(seen, k_near, q_near)) ** 2 / scale, axis=0)
-        k, q = k_near[power.argmax()], q_near[power.argmax()]
-    return k, q
+        gain = _explained(seen, k_near, q_near)[0]
+        k, q = k_near[gain.argmax()], q_near[gain.argmax()]
+    return k, q, _explained(seen, np.array([k]), np.array([q]))[1][:, 0]
+
+
+def _explained(seen: _Seen, k: Array, q: Array) -> tuple[np.ndarray, np.ndarray]:
+    """Half the squares that patterns k (n,), q (n,) of any size and phase in each run explain (n,), and these phases
+    (runs, n)."""
+    angle = (seen.gone[:, None] + seen.way)[..., None] * k + (seen.turned[:, None] + seen.turn)[..., None] * q
+    cosine, sine = seen.answers @ np.cos(angle), seen.answers @ np.sin(angle)
+    residual = seen.residual[..., None]
+    pairs = (cosine, cosine), (sine, sine), (cosine, sine), (cosine, residual), (sine, residual)
+    by_run = np.array([[np.sum(a[own] * b[own], axis=(0, 1)) for own in seen.runs] for a, b in pairs])
+    cc, ss, cs, c, s = by_run
+    volume = np.maximum(cc * ss - cs**2, 1e-12 * cc * ss + 1e-300)
+    a, b = (ss * c - cs * s) / volume, (cc * s - cs * c) / volume
+    return 0.5 * np.sum(a * c + b * s, axis=0), np.arctan2(-b, a)
 
 
 def _by_chance(runs: list[Array], count: int) -> float:

@@ -217,7 +217,7 @@ def test_what_comes_once_per_turn_of_a_wheel_is_discovered(act, times):
     law = Discovered(act, times, "own angle", at, 0.2 * np.cos(at), period=0.16, half_track=half)
     first = searched(dataclasses.replace(ROBOT, discovered=(law,)), 4)[0].curves[0]
     assert first.kind == Kind(act, times, "own angle")
-    assert first.turning.period == pytest.approx(0.16, rel=0.01)
+    assert first.turning.period == pytest.approx(0.16, rel=0.02)  # of some seven turns in a run
     assert first.turning.half_track == pytest.approx(half, rel=0.1)
     assert np.abs(first.value - 0.2 * np.cos(at)).max() < 0.06
 

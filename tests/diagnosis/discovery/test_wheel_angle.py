@@ -8,7 +8,7 @@ import pytest
 from jaxident.diagnosis.discovery import wheel_angle
 from jaxident.diagnosis.discovery.candidates import Path
 from jaxident.diagnosis.discovery.curves import precision
-from jaxident.diagnosis.discovery.wheel_angle import _powers, _Seen, _steps, _strongest, _waves, turnings
+from jaxident.diagnosis.discovery.wheel_angle import _explained, _powers, _Seen, _steps, _strongest, _waves, turnings
 from jaxident.diagnosis.fit.refit import Data, Solution
 from jaxident.diagnosis.motion.linear import Linear
 from jaxident.diagnosis.motion.responses import Responses
@@ -35,7 +35,8 @@ def seen_by(rng, size: float) -> _Seen:
     asked = rng.normal(size=way.shape) + size * np.cos(angle)
     gone, turned = way[:, 0], turn[:, 0]
     own = [np.flatnonzero(run == k) for k in range(RUNS)]
-    return _Seen(asked, way - gone[:, None], turn - turned[:, None], gone, turned, own)
+    unit = np.broadcast_to(np.eye(ROWS), (len(run), ROWS, ROWS))
+    return _Seen(unit, asked, asked, way - gone[:, None], turn - turned[:, None], gone, turned, own)
 
 
 def path() -> Path:
@@ -48,6 +49,22 @@ def test_a_pattern_in_noise_is_found_with_its_period_and_its_place(seed):
     assert abs(found.period - PERIOD) < 0.02 * PERIOD
     assert abs(found.half_track - HALF) < 0.1 * HALF
     assert found.power > found.by_chance
+
+
+def test_what_a_pattern_explains_is_what_a_plain_fit_explains():
+    seen = seen_by(np.random.default_rng(9), 0.7)
+    k, q = np.array([30.0, 33.0]), np.array([2.4, 2.6])
+    gain, phase = _explained(seen, k, q)
+    for n in range(2):
+        angle = k[n] * (seen.gone[:, None] + seen.way) + q[n] * (seen.turned[:, None] + seen.turn)
+        total = 0.0
+        for run, own in enumerate(seen.runs):
+            columns = np.stack([np.cos(angle[own]).ravel(), np.sin(angle[own]).ravel()], axis=1)
+            (a, b), *_ = np.linalg.lstsq(columns, seen.asked[own].ravel())
+            total += 0.5 * np.sum((columns @ [a, b]) ** 2)
+            best = np.cos(angle[own] + phase[run, n]).ravel()
+            assert np.allclose(columns @ [a, b], np.hypot(a, b) * best)
+        assert gain[n] == pytest.approx(total)
 
 
 def test_noise_alone_hardly_brings_more_than_it_may_by_chance():
