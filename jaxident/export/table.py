@@ -102,14 +102,20 @@ def _effect_rows(effect: Any, model: Model) -> list[Row]:
 
 
 def _law_rows(law: Discovered, model: Model) -> list[Row]:
-    """One row for each knot of a discovered law."""
+    """One row for each knot of a discovered law, and two for what the angle of a wheel goes by."""
     factor = "" if law.times == "1" else f"{law.times} times a law of "
     spread = np.full(np.shape(law.value), np.nan) if law.standard_deviation is None else law.standard_deviation
     places = [
         [f"{signal} at {float(at):.4g} {SIGNALS[signal]}" for at in knots]
         for signal, knots in knots_by_signal(law).items()
     ]
-    return [
+    turning = {"period": law.period, "half_track": law.half_track}
+    wheel = [
+        _row(f"discovered: {law.acts_on}", name, value, "m", float("nan"), False, model)
+        for name, value in turning.items()
+        if value is not None
+    ]
+    return wheel + [
         _row(f"discovered: {law.acts_on}", f"{factor}{', '.join(at)}", value, value_unit(law), _or_nan(own),
              law.standard_deviation is not None, model)
         for at, value, own in zip(itertools.product(*places), np.ravel(law.value), np.ravel(spread), strict=True)

@@ -281,3 +281,12 @@ def test_a_discovered_law_is_told_with_what_it_is_worth(target):
     else:
         assert part.how == "not carried"
         assert part.gap > 1.0
+
+
+def test_the_table_tells_what_a_law_of_a_wheel_goes_by():
+    at = np.linspace(-np.pi, np.pi, 5)
+    law = Discovered("push of the left wheel", "1", "own angle", at, 0.1 * np.cos(at), period=0.19, half_track=-0.08)
+    text = ji.export(dataclasses.replace(PLAIN, discovered=(law,)), "table").text
+    rows = [line.split(" | ") for line in text.splitlines() if "discovered: push of the left wheel" in line]
+    assert len(rows) == len(at) + 2
+    assert [row[1:4] for row in rows[:2]] == [["period", "0.19", "m"], ["half_track", "-0.08", "m"]]
