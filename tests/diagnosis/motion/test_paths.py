@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from jaxident.array_types import AT_REST
-from jaxident.diagnosis.motion.paths import push_of, residuals, track
+from jaxident.diagnosis.motion.paths import first_angles, push_of, residuals, track
 from jaxident.diagnosis.motion.windows import cut
 from jaxident.diagnosis.preparation.translate import abreast_of_marker
 from jaxident.effects.catalogue import CATALOGUE, to_vector
@@ -23,10 +23,11 @@ from jaxident.effects.coordinates import (
 )
 from jaxident.effects.fast_input import PUSHING
 from jaxident.effects.fast_motion import report
-from jaxident.effects.full import SHARP_SUBSTEPS, run_full
+from jaxident.effects.full import SHARP_SUBSTEPS, run_full, run_states
+from jaxident.effects.law_arrays import laws_of
 from jaxident.log import make_log
 from jaxident.robot.drive import Physical
-from jaxident.robot.model import Effect
+from jaxident.robot.model import Discovered, Effect
 
 STEP, ROWS = 0.03, 200
 DRIVE = Physical(np.array([4.0, 5.0]), np.array([[1.2, 1.1], [9.0, -8.5]]), np.array([0.02, -1.0]))
@@ -160,3 +161,24 @@ def test_a_robot_abreast_of_its_marker_is_the_one_that_is_seen_from_there():
     vector, wanted = nominal(), neutral_vector(nominal_vector(beside(DRIVE, 0.05), DEAD_ZONE))
     vector[PLACES["marker_offset", "left"]] = 0.05
     np.testing.assert_allclose(abreast_of_marker(vector), wanted, atol=1e-12)
+
+
+def test_windows_go_on_at_the_angle_that_the_wheel_has_turned_to(log):
+    """A law of a wheel, in windows that begin far within the run: its angle there follows from the way before."""
+    at = np.linspace(-np.pi, np.pi, 9)
+    law = Discovered("push of the right wheel", "1", "own angle", at, 0.2 * np.cos(at), period=0.15, half_track=0.13)
+    laws = laws_of((law,))
+    states, _ = run_states(DRIVE, DEAD_ZONE, to_vector(()), log.t, log.command, AT_REST, noise=None, key=None,
+                           substeps=SHARP_SUBSTEPS, parts=frozenset(), laws=laws)  # fmt: skip
+    driven = log._replace(x=np.asarray(states.x), y=np.asarray(states.y), theta=np.asarray(states.theta))
+    windows = cut(driven, 25)
+    starts = np.stack([np.asarray(part)[windows.row] for part in states])
+    begun = jax.jit(first_angles)(laws, windows)
+    assert np.ptp(np.asarray(begun)[0]) > 2.0 * np.pi
+    push, left_by = PUSH(nominal(), windows), jax.jit(residuals)
+    left = [
+        float(jnp.abs(left_by(nominal(), starts, push, windows, each)).max())
+        for each in (laws, laws._replace(phase=laws.phase + 0.5), None)
+    ]
+    assert left[0] < 0.03 * left[2]
+    assert left[0] < 0.1 * left[1]
