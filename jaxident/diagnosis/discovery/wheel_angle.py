@@ -19,6 +19,7 @@ from jaxident.diagnosis.fit.refit import Data, Solution
 from jaxident.diagnosis.motion.linear import without_starts
 from jaxident.diagnosis.motion.responses import Responses
 from jaxident.effects.law_kinds import ANGLE, PUSHES, ROLLINGS
+from jaxident.parallel import in_parallel
 
 SLOWEST, FASTEST = 0.7, np.pi
 """Turn of a pattern at the wheel's mean speed: at least in a second [rad], at most from row to row [rad]. From 2 rad in
@@ -56,17 +57,20 @@ Found = list[tuple[Kind, Turning]]
 def turnings(data: Data, fit: Solution, base: Array, path: Path, responses: Responses) -> Found:
     """For each wheel and each kind of law that goes by its angle the pattern that the poses ask for most; base
     (windows, numbers, n): whitened columns of a fit free of start states, the residual last."""
-    found: Found = []
-    residual = _left(base)
+    sought: list[tuple[Kind, float, float]] = []
     for number, (push, roll) in enumerate(zip(PUSHES, ROLLINGS, strict=True)):
         along, heading = path.gain[:, number] / path.rates
         if along == 0.0 or heading == 0.0:
             continue  # a wheel that does nothing, of a robot that coasts
         half, side = abs(float(along / heading)), float(np.sign(along * heading))
-        for kind in (Kind(push, "1", ANGLE), Kind(push, "own push", ANGLE), Kind(roll, "own speed", ANGLE)):
-            seen = _seen(data, fit, residual, path, responses, kind)
-            found.append((kind, _strongest(seen, path, half, side)))
-    return found
+        kinds = Kind(push, "1", ANGLE), Kind(push, "own push", ANGLE), Kind(roll, "own speed", ANGLE)
+        sought += [(kind, half, side) for kind in kinds]
+    residual = _left(base)
+
+    def strongest(kind: Kind, half: float, side: float) -> tuple[Kind, Turning]:
+        return kind, _strongest(_seen(data, fit, residual, path, responses, kind), path, half, side)
+
+    return in_parallel(strongest, sought)
 
 
 def _left(base: Array) -> np.ndarray:
