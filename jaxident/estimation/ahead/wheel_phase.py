@@ -22,16 +22,15 @@ Misfit = Callable[[Array, Sequence[int]], Array]
 
 
 def phases_of(misfit: Misfit, laws: Sequence[int], shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Phases (laws, starts) [rad], 0 for laws not in `laws`, and their deviations [rad]; shape: laws, starts. Each law
-    is looked for by itself first, and where there are several, once more beside the others."""
-    phase, deviation = np.zeros(shape), np.full(shape, UNKNOWN)
-    for k, acting in [(k, [k]) for k in laws] + [(k, list(laws)) for k in laws if len(laws) > 1]:
-        step = 2.0 * np.pi / GRID
+    """Phases (laws, starts) [rad], 0 for laws not in `laws`, and their deviations [rad]; shape: laws, starts. The laws,
+    the one that brings most first, are looked for one after the other, each beside those before it; then all but the
+    last once more beside all."""
+    phase, step = np.zeros(shape), 2.0 * np.pi / GRID
+    for k, acting in [(k, laws[: n + 1]) for n, k in enumerate(laws)] + [(k, laws) for k in laws[:-1]]:
         whole = _squares(misfit, phase, k, acting, step * np.arange(GRID))
         phase[k] = step * whole.argmin(axis=0)
-        phase[k], deviation[k] = _vertex(misfit, phase, k, acting, step)
-        phase[k], deviation[k] = _vertex(misfit, phase, k, acting, step / CLOSER)
-    return phase, deviation
+        phase[k], _ = _vertex(misfit, phase, k, acting, step)
+    return closer(misfit, laws, phase)
 
 
 def closer(misfit: Misfit, laws: Sequence[int], phase: Array) -> tuple[np.ndarray, np.ndarray]:
