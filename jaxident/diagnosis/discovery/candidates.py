@@ -49,7 +49,7 @@ VARIED = 1e-6
 class Path(NamedTuple):
     """Signals (windows, rows) along the path of a fit, and those of each wheel's own (windows, rows, 2); gain (2, 2)
     and rates (2,) of the nominal drive; seen (windows, numbers). way [m] and turn [rad] since the run began, and the
-    time step [s] (windows, rows); run (windows,)."""
+    time step [s] (windows, rows)."""
 
     signals: dict[str, Any]
     own: dict[str, Any]
@@ -59,13 +59,12 @@ class Path(NamedTuple):
     way: Any
     turn: Any
     step: Any
-    run: Any
 
 
 class Turning(NamedTuple):
     """What a law goes by that comes once per turn of something on a wheel: `Discovered.period` and `half_track` [m],
-    the angle [rad] of the wheel when each run begins (runs,); the power of the pattern that was found, and how much of
-    it the best of so many has by chance."""
+    the angle [rad] of the wheel when its run begins, as each window has it (windows,); the power of the pattern that
+    was found, and how much of it the best of so many has by chance."""
 
     period: float
     half_track: float
@@ -105,7 +104,7 @@ def path_of(fit: Solution, windows: Windows, laws: Laws | None = None) -> Path:
     own |= {name: np.asarray(part).transpose(2, 0, 1) for name, part in remembered(past, axis=1).items()}
     seen = np.repeat(np.asarray(windows.seen).T, 3, axis=1)
     way, turn = (begin[:, None] + since for begin, since in zip(windows.way, _since(x, y, theta), strict=True))
-    return Path(signals, own, gain, rates, seen, way, turn, step, windows.run)
+    return Path(signals, own, gain, rates, seen, way, turn, step)
 
 
 def _since(x: Array, y: Array, theta: Array) -> tuple[np.ndarray, np.ndarray]:
@@ -139,7 +138,7 @@ def by_angle(kind: Kind, turning: Turning, path: Path, responses: Responses) -> 
 def _angle(turning: Turning, path: Path) -> np.ndarray:
     """The angle of a wheel (windows, rows) in [-pi, pi)."""
     turns = (path.way + turning.half_track * path.turn) / turning.period
-    angle = turning.phase[path.run][:, None] + 2.0 * np.pi * turns
+    angle = turning.phase[:, None] + 2.0 * np.pi * turns
     return (angle + np.pi) % (2.0 * np.pi) - np.pi
 
 

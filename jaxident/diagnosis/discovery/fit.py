@@ -67,7 +67,7 @@ def laws_from(curves: tuple[Curve, ...], windows: Windows) -> Laws | None:
     laws = laws_of([as_law(curve) for curve in curves])
     if laws is None:
         return None
-    phase = np.zeros((len(laws.phase), len(windows.session)))
+    phase = np.zeros((len(laws.phase), len(windows.run)))
     for k, curve in enumerate(curves):
         if curve.turning is not None:
             phase[k] = curve.turning.phase

@@ -1,10 +1,10 @@
 """What comes once per turn of something on a wheel: its period, where the wheel is, and its angle when a run begins.
 
 A pattern exp(i (k way + q turn)) is held against what the poses ask to be added to a wheel's push. Each window gives
-one complex number, and these are added up over a run at the angles that its windows begin at, for many k [rad/m] and
-q [rad/rad]: a periodogram (Lomb 1976, Astrophysics and Space Science 39) over the way of a wheel in place of time. Of
-noise, the square of a run's sum over the sum of squares is an exponential variable of mean 1; from this follows what
-the best of so many patterns brings by chance.
+one complex number, and these are added up over a part of a run at the angles that its windows begin at, for many k
+[rad/m] and q [rad/rad]: a periodogram (Lomb 1976, Astrophysics and Space Science 39) over the way of a wheel in place
+of time. Of noise, the square of such a sum over the sum of squares is an exponential variable of mean 1; from this
+follows what the best of so many patterns brings by chance.
 """
 
 from typing import NamedTuple
@@ -29,6 +29,11 @@ PLACES = (0.3, 1.2)
 APART = 1.0
 """Angle [rad] at the end of a window, or of a run, from one k or q to the next. With 0.7 the same was found on three
 robots."""
+LONGEST = 32
+"""Windows over which a pattern is added up: the angle is free again in the next ones. So a long log takes no more
+patterns than a short one. No other number was tried."""
+NARROW = 4.0
+"""How much further than nine windows of ten the widest one may go before it sets the steps. No other was tried."""
 ZOOMS, AROUND = 4, np.linspace(-2.0, 2.0, 9)
 """Times that the search looks closer, and where then, in steps of the grid before; the next grid is half as wide. No
 others were tried."""
@@ -37,8 +42,8 @@ others were tried."""
 class _Seen(NamedTuple):
     """Of a kind of law: white answers of the poses to a unit in each row (windows, numbers, rows), and what is to be
     explained (windows, numbers); what the poses ask for in each row (windows, rows), the product of both; way and turn
-    since the window's first row (windows, rows), and those of this row in its run (windows,); the windows of each
-    run."""
+    since the window's first row (windows, rows), and those of this row in its run (windows,); the windows of each part
+    of a run."""
 
     answers: Array
     residual: Array
@@ -47,7 +52,7 @@ class _Seen(NamedTuple):
     turn: Array
     gone: Array
     turned: Array
-    runs: list[Array]
+    parts: list[Array]
 
 
 Found = list[tuple[Kind, Turning]]
@@ -58,6 +63,8 @@ def turnings(data: Data, fit: Solution, base: Array, path: Path, responses: Resp
     """For each wheel and each kind of law that goes by its angle the pattern that the poses ask for most; base
     (windows, numbers, n): whitened columns of a fit free of start states, the residual last."""
     sought: list[tuple[Kind, float, float]] = []
+    if not (np.isfinite(path.way).all() and np.isfinite(path.turn).all()):
+        return []
     for number, (push, roll) in enumerate(zip(PUSHES, ROLLINGS, strict=True)):
         along, heading = path.gain[:, number] / path.rates
         if along == 0.0 or heading == 0.0:
@@ -87,14 +94,20 @@ def _seen(data: Data, fit: Solution, residual: Array, path: Path, responses: Res
     unit = np.broadcast_to(np.eye(rows), (count, rows, rows))
     answers, _ = without_starts(data.whitener, answers_of(kind, unit, path, responses), fit.linear.starts)
     asked = (answers.transpose(0, 2, 1) @ residual[..., None])[..., 0]
-    gone, turned, run = path.way[:, 0], path.turn[:, 0], np.asarray(data.windows.run)
-    runs = [np.flatnonzero(run == number) for number in range(len(data.windows.session))]
-    return _Seen(answers, residual, asked, path.way - gone[:, None], path.turn - turned[:, None], gone, turned, runs)
+    gone, turned = path.way[:, 0], path.turn[:, 0]
+    parts = _parts(np.asarray(data.windows.run))
+    return _Seen(answers, residual, asked, path.way - gone[:, None], path.turn - turned[:, None], gone, turned, parts)
+
+
+def _parts(run: Array) -> list[np.ndarray]:
+    """The windows of each part of a run, LONGEST at most."""
+    whole = [np.flatnonzero(run == number) for number in np.unique(run)]
+    return [part for own in whole for part in np.array_split(own, int(np.ceil(len(own) / LONGEST)))]
 
 
 def _strongest(seen: _Seen, path: Path, half: float, side: float) -> Turning:
-    """The pattern of the largest sum of all runs, of a wheel about `half` [m] from the middle on one side (1 right, -1
-    left)."""
+    """The pattern of the largest sum over all parts of runs, of a wheel about `half` [m] from the middle on one side (1
+    right, -1 left)."""
     (k_step, more_k), (q_step, more_q) = (
         _steps(seen, *parts) for parts in ((seen.way, seen.gone), (seen.turn, seen.turned))
     )
@@ -111,14 +124,15 @@ def _strongest(seen: _Seen, path: Path, half: float, side: float) -> Turning:
         i, j, m = np.unravel_index(power.argmax(), power.shape)
         best = max(best, (float(power[i, j, m]), k + more_k[i], side * (q_all[near][j] + more_q[m])))
     k, q, phase = _closer(seen, best, k_step / len(more_k), q_step / len(more_q))
-    return Turning(2.0 * np.pi / k, q / k, phase, best[0], _by_chance(seen.runs, count))
+    return Turning(2.0 * np.pi / k, q / k, phase, best[0], _by_chance(seen.parts, count))
 
 
 def _steps(seen: _Seen, since: Array, begun: Array) -> tuple[float, np.ndarray]:
     """Step from one rate to the next that tells patterns apart within windows, and rates between two of these that tell
-    them apart within runs; since (windows, rows) the first row of a window, begun (windows,) in its run."""
-    far = max(float(np.quantile(np.abs(since[:, -1]), 0.9)), 1e-6)
-    wide = max(float(np.ptp(begun[own])) if len(own) else 0.0 for own in seen.runs)
+    them apart within parts of runs; since (windows, rows) the first row of a window, begun (windows,) in its run."""
+    each = np.ptp(since, axis=1)
+    far = max(float(np.quantile(each, 0.9)), float(each.max()) / NARROW, 1e-6)
+    wide = max(float(np.ptp(begun[own])) for own in seen.parts)
     count = int(np.ceil(wide / far)) + 1
     return APART / far, APART / far * ((np.arange(count) + 0.5) / count - 0.5)
 
@@ -135,7 +149,7 @@ def _powers(seen: _Seen, k: float, waves: Array, more_k: Array, more_q: Array) -
     each = (asked.astype(np.complex64)[:, None] @ waves)[:, 0]
     moved = each[..., None] * more_q[:, None]
     total: Array = 0.0
-    for own in seen.runs:
+    for own in seen.parts:
         whole = np.tensordot(more_k[own], moved[own], axes=(0, 0))
         squares = np.maximum(np.sum(np.abs(each[own]) ** 2, axis=0), 1e-30)
         total = total + (whole.real**2 + whole.imag**2) / squares[:, None]
@@ -143,33 +157,35 @@ def _powers(seen: _Seen, k: float, waves: Array, more_k: Array, more_q: Array) -
 
 
 def _closer(seen: _Seen, best: tuple[float, float, float], k_step: float, q_step: float) -> tuple:
-    """k, q and phases (runs,) of the pattern that explains most near some k and q."""
+    """k, q and phases (windows,) of the pattern that explains most near some k and q."""
     _, k, q = best
     for zoom in range(ZOOMS):
         grid = np.meshgrid(k + 0.5**zoom * k_step * AROUND, q + 0.5**zoom * q_step * AROUND)
         k_near, q_near = (part.ravel() for part in grid)
         gain = _explained(seen, k_near, q_near)[0]
         k, q = k_near[gain.argmax()], q_near[gain.argmax()]
-    return k, q, _explained(seen, np.array([k]), np.array([q]))[1][:, 0]
+    phase = np.zeros(len(seen.gone))
+    for own, angle in zip(seen.parts, _explained(seen, np.array([k]), np.array([q]))[1][:, 0], strict=True):
+        phase[own] = angle
+    return k, q, phase
 
 
 def _explained(seen: _Seen, k: Array, q: Array) -> tuple[np.ndarray, np.ndarray]:
-    """Half the squares that patterns k (n,), q (n,) of any size and phase in each run explain (n,), and these phases
-    (runs, n)."""
+    """Half the squares that patterns k (n,), q (n,) of any size and phase in each part of a run explain (n,), and these
+    phases (parts, n)."""
     angle = (seen.gone[:, None] + seen.way)[..., None] * k + (seen.turned[:, None] + seen.turn)[..., None] * q
     cosine, sine = seen.answers @ np.cos(angle), seen.answers @ np.sin(angle)
     residual = seen.residual[..., None]
     pairs = (cosine, cosine), (sine, sine), (cosine, sine), (cosine, residual), (sine, residual)
-    by_run = np.array([[np.sum(a[own] * b[own], axis=(0, 1)) for own in seen.runs] for a, b in pairs])
-    cc, ss, cs, c, s = by_run
+    cc, ss, cs, c, s = np.array([[np.sum(a[own] * b[own], axis=(0, 1)) for own in seen.parts] for a, b in pairs])
     volume = np.maximum(cc * ss - cs**2, 1e-12 * cc * ss + 1e-300)
     a, b = (ss * c - cs * s) / volume, (cc * s - cs * c) / volume
     return 0.5 * np.sum(a * c + b * s, axis=0), np.arctan2(-b, a)
 
 
-def _by_chance(runs: list[Array], count: int) -> float:
-    """What the best of `count` patterns brings by chance: the sum of an exponential variable for each run that one of
-    so many exceeds. A run of one window brings 1, whatever the pattern."""
-    alone, several = (sum(len(own) == 1 for own in runs), sum(len(own) > 1 for own in runs))
+def _by_chance(parts: list[Array], count: int) -> float:
+    """What the best of `count` patterns brings by chance: the sum of an exponential variable for each part of a run
+    that one of so many exceeds. A part of one window brings 1, whatever the pattern."""
+    alone, several = (sum(len(own) == 1 for own in parts), sum(len(own) > 1 for own in parts))
     tried = np.linspace(0.0, 40.0 + 4.0 * several, 4001)
     return alone + float(tried[np.argmax(np.asarray(gammaincc(max(several, 1), tried)) * count < 1.0)])

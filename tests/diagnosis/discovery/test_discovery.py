@@ -127,7 +127,7 @@ def test_a_surface_answers_as_its_knots_say():
     rng = np.random.default_rng(4)
     x, y, v = rng.uniform(-1.0, 1.0, (3, 2, 30))
     answer = rng.normal(size=(2, 90, 30))
-    path = Path({"x": x, "y": y, "v": v}, {}, np.eye(2), np.ones(2), np.ones((2, 90)), x, y, x, np.arange(2))
+    path = Path({"x": x, "y": y, "v": v}, {}, np.eye(2), np.ones(2), np.ones((2, 90)), x, y, x)
     columns = columns_of(Kind("acceleration along", "v", "x", "y"), (FLOOR, FLOOR), path, Responses(answer, None, None))
     value = rng.normal(size=(SURFACE_KNOTS, SURFACE_KNOTS))
     rows = np.array([np.interp(np.ravel(y), FLOOR, row) for row in value])

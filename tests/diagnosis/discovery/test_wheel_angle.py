@@ -8,7 +8,16 @@ import pytest
 from jaxident.diagnosis.discovery import wheel_angle
 from jaxident.diagnosis.discovery.candidates import Path
 from jaxident.diagnosis.discovery.curves import precision
-from jaxident.diagnosis.discovery.wheel_angle import _explained, _powers, _Seen, _steps, _strongest, _waves, turnings
+from jaxident.diagnosis.discovery.wheel_angle import (
+    _explained,
+    _parts,
+    _powers,
+    _Seen,
+    _steps,
+    _strongest,
+    _waves,
+    turnings,
+)
 from jaxident.diagnosis.fit.refit import Data, Solution
 from jaxident.diagnosis.motion.linear import Linear
 from jaxident.diagnosis.motion.responses import Responses
@@ -40,7 +49,7 @@ def seen_by(rng, size: float) -> _Seen:
 
 
 def path() -> Path:
-    return Path({}, {}, None, None, None, None, None, np.full((1, 1), STEP), None)
+    return Path({}, {}, None, None, None, None, None, np.full((1, 1), STEP))
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -58,7 +67,7 @@ def test_what_a_pattern_explains_is_what_a_plain_fit_explains():
     for n in range(2):
         angle = k[n] * (seen.gone[:, None] + seen.way) + q[n] * (seen.turned[:, None] + seen.turn)
         total = 0.0
-        for run, own in enumerate(seen.runs):
+        for run, own in enumerate(seen.parts):
             columns = np.stack([np.cos(angle[own]).ravel(), np.sin(angle[own]).ravel()], axis=1)
             (a, b), *_ = np.linalg.lstsq(columns, seen.asked[own].ravel())
             total += 0.5 * np.sum((columns @ [a, b]) ** 2)
@@ -86,7 +95,7 @@ def test_the_power_of_patterns_is_what_a_plain_sum_says():
         angle = k * (seen.gone[:, None] + seen.way) + q[j] * (seen.turned[:, None] + seen.turn)
         each = np.sum(seen.asked * np.exp(1j * angle), axis=1)
         moved = each * np.exp(1j * (more_k[i] * seen.gone + more_q[m] * seen.turned))
-        plain = sum(abs(moved[own].sum()) ** 2 / np.sum(np.abs(each[own]) ** 2) for own in seen.runs)
+        plain = sum(abs(moved[own].sum()) ** 2 / np.sum(np.abs(each[own]) ** 2) for own in seen.parts)
         assert abs(found[i, j, m] - plain) < 1e-4 * plain
 
 
@@ -94,7 +103,7 @@ def test_steps_tell_patterns_apart_at_the_end_of_a_run():
     seen = seen_by(np.random.default_rng(6), 0.0)
     step, more = _steps(seen, seen.way, seen.gone)
     rates = np.sort(np.add.outer(step * np.arange(5), more).ravel())
-    wide = max(np.ptp(seen.gone[own]) for own in seen.runs)
+    wide = max(np.ptp(seen.gone[own]) for own in seen.parts)
     np.testing.assert_allclose(np.diff(rates), np.diff(rates)[0])
     assert np.diff(rates)[0] * wide <= wheel_angle.APART
 
@@ -116,7 +125,7 @@ def test_a_wheel_that_does_nothing_is_left_out():
     own = {name: np.ones((*way.shape, 2)) for name in ("1", "own push", "own speed")}
     step = np.full(way.shape, STEP)
     run = np.repeat(np.arange(RUNS), WINDOWS)
-    whole = Path({}, own, gain, np.array([3.0, 5.0]), None, way, turn, step, run)
+    whole = Path({}, own, gain, np.array([3.0, 5.0]), None, way, turn, step)
     rng = np.random.default_rng(8)
     answer = np.cumsum(rng.normal(size=(len(run), ROWS, ROWS)), axis=1)
     linear = Linear(None, None, rng.normal(size=(len(run), ROWS, 5)))
@@ -126,3 +135,20 @@ def test_a_wheel_that_does_nothing_is_left_out():
     assert [kind.acts_on for kind, _ in found] == ["push of the left wheel"] * 2 + ["rolling of the left wheel"]
     assert all(np.isfinite([turning.period, turning.half_track]).all() for _, turning in found)
     assert all(turning.half_track < 0.0 for _, turning in found)
+
+
+def test_a_long_run_is_searched_in_parts():
+    run = np.repeat([0, 1, 2], [70, 1, 20])
+    parts = _parts(run)
+    assert max(map(len, parts)) <= wheel_angle.LONGEST
+    np.testing.assert_array_equal(np.concatenate(parts), np.arange(91))
+    assert [len(np.unique(run[own])) for own in parts] == [1] * len(parts)
+
+
+def test_a_robot_that_mostly_stands_asks_for_no_more_patterns():
+    """Steps follow the widest windows where nearly all are narrow."""
+    seen = seen_by(np.random.default_rng(11), 0.0)
+    still = np.where(np.arange(len(seen.gone)) % 12 == 0, 1.0, 1e-4)[:, None]
+    gone = np.concatenate([np.cumsum((still * seen.way)[own][:, -1]) for own in seen.parts])
+    _, more = _steps(seen._replace(gone=gone), still * seen.way, gone)
+    assert len(more) < 50
