@@ -64,7 +64,7 @@ def turned(settings: Mapping[str, Any], angles: Array | None, way: Array, turn: 
     without laws."""
     if angles is None:
         return None
-    per_metre, per_radian = (_each(rate, way) for rate in jnp.moveaxis(settings[DISCOVERED]["laws"].turn, -1, 0))
+    per_metre, per_radian = (_each(rate, way) for rate in jnp.moveaxis(settings[DISCOVERED]["laws"].per_way, -1, 0))
     return angles + per_metre * way + per_radian * turn
 
 

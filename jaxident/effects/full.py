@@ -122,8 +122,8 @@ def run_states(
 def _first_angles(laws: Laws | None, key: Array | None) -> Array | None:
     """The angles (laws,) [rad] at which wheels begin that laws go by: drawn, or without a key 0; None without laws."""
     if laws is None or key is None:
-        return None if laws is None else jnp.zeros(len(laws.turn))
-    return jax.random.uniform(jax.random.fold_in(key, 2), (len(laws.turn),), maxval=2.0 * jnp.pi)
+        return None if laws is None else jnp.zeros(len(laws.per_way))
+    return jax.random.uniform(jax.random.fold_in(key, 2), (len(laws.per_way),), maxval=2.0 * jnp.pi)
 
 
 def disturb(pose: Pose, vector: Array, t: Array, *, noise: Noise | None, key: Array, parts: frozenset[str]) -> Pose:

@@ -22,7 +22,7 @@ from jaxident.robot.model import Discovered
 class Laws(NamedTuple):
     """Some laws as arrays: places in ACTS, TIMES and SIGNALS (laws,), knots (laws, knots) and (laws, second knots), and
     values there (laws, knots, second knots). Without surfaces there is one second knot; a curve beside a surface has
-    the same values at all of them. turn (laws, 2): how far the wheel of a law turns per metre of the robot's way
+    the same values at all of them. per_way (laws, 2): how far the wheel of a law turns per metre of the robot's way
     [rad/m] and per radian of its turn, 0 where the wheel's angle does not matter; phase (laws, n) [rad]: its angle at
     the beginning of each of n runs or windows, or (laws, 1) if all begin alike; sure, of the same shape: the part that
     is added of what such a law says, below 1 where the angle is uncertain."""
@@ -34,7 +34,7 @@ class Laws(NamedTuple):
     at: Any
     second_at: Any
     value: Any
-    turn: Any
+    per_way: Any
     phase: Any
     sure: Any
 

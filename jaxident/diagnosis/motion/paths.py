@@ -80,4 +80,4 @@ def first_angles(laws: Laws | None, windows: Windows) -> Array | None:
     """The angles (laws, windows) of the wheels that laws go by in the first row of each window; None without laws."""
     if laws is None:
         return None
-    return laws.phase + laws.turn @ windows.way
+    return laws.phase + laws.per_way @ windows.way

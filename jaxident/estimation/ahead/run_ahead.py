@@ -132,7 +132,7 @@ def _phases(
 
     phase, _ = phases_of(partial(misfit, part), by_angle(model), (MOST_LAWS, len(anchors)))
     gone = ways(log.runs())[:, starts.run, np.maximum(starts.row - first + stretch.first, 0)]
-    phase = phase[:, own] + laws.turn @ (gone - gone[:, anchors[own]])
+    phase = phase[:, own] + laws.per_way @ (gone - gone[:, anchors[own]])
     return closer(partial(misfit, stretch), by_angle(model), phase)
 
 

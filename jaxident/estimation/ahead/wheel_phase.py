@@ -11,7 +11,7 @@ GRID = 12
 """Angles that are tried, round the circle."""
 CLOSER = 3.0
 """How much closer together three angles are that are tried about the best one. No other was tried."""
-APART = 100
+FOLLOWED = 100
 """Rows at most between two starts at which the whole circle is tried, half of what the filter takes in. From one to the
 next the poses tell how far the wheels have turned, and three angles about that are tried at each start."""
 UNKNOWN = np.pi / np.sqrt(3.0)
@@ -43,13 +43,13 @@ def closer(misfit: Misfit, laws: Sequence[int], phase: Array) -> tuple[np.ndarra
 
 def followed(starts: Starts) -> np.ndarray:
     """Of each start the number of that one, itself or before it in its run, whose phases it goes on from (starts,): one
-    that knew two thirds of as many rows, and stands less than APART before it."""
+    that knew two thirds of as many rows, and stands less than FOLLOWED before it."""
     own = np.arange(len(starts.row))
     for run in np.unique(starts.run):
         here = np.flatnonzero(starts.run == run)
         last = -1
         for k in here[np.argsort(starts.row[here], kind="stable")]:
-            if last < 0 or starts.row[k] - starts.row[last] >= min(APART, starts.row[last] / 2):
+            if last < 0 or starts.row[k] - starts.row[last] >= min(FOLLOWED, starts.row[last] / 2):
                 last = k
             own[k] = last
     return own

@@ -3,7 +3,7 @@
 import numpy as np
 
 from jaxident.estimation.ahead.stretches import Starts
-from jaxident.estimation.ahead.wheel_phase import APART, UNKNOWN, closer, followed, phases_of
+from jaxident.estimation.ahead.wheel_phase import FOLLOWED, UNKNOWN, closer, followed, phases_of
 
 TRUE = np.array([[0.3, 2.0, 5.1], [6.1, 1.2, 3.3]])
 SIZE = np.array([[40.0, 90.0, 200.0], [30.0, 10.0, 70.0]])
@@ -51,7 +51,7 @@ def test_phases_near_the_best_ones_become_these():
 
 def test_a_start_goes_on_from_one_before_it_in_its_run():
     """One that knew less than two thirds of its rows, or that lies far behind, says nothing."""
-    row = np.array([20, 29, 50, 400, 400 + APART - 1, 400 + APART, 20, 25])
+    row = np.array([20, 29, 50, 400, 400 + FOLLOWED - 1, 400 + FOLLOWED, 20, 25])
     run = np.array([0, 0, 0, 0, 0, 0, 1, 1])
     own = np.array([0, 0, 2, 3, 3, 5, 6, 6])
     np.testing.assert_array_equal(followed(Starts(run, row)), own)
