@@ -312,6 +312,19 @@ def test_a_map_of_the_floor_is_told_and_drawn():
     assert "dashed" in picture.caption
 
 
+def test_a_law_of_a_wheel_is_told_with_how_far_it_rolls_from_turn_to_turn():
+    at = np.linspace(-np.pi, np.pi, 10)
+    law = Discovered("push of the right wheel", "own push", "own angle", at, 0.2 * np.cos(at), np.full(10, 0.01),
+                     period=0.189, half_track=0.08)  # fmt: skip
+    shown = Shown(Kind("push of the right wheel", "own push", "own angle"), law, (9,) * 10, 0.9, 0.01, None)
+    page = diagnosis_page(made_up("unknown")._replace(discovered=(shown,)), "runs")
+    told = "push of that wheel times a curve of the angle of that wheel, once every 189 mm of its way"
+    assert f"to the push of the right wheel comes {told}" in page.lead
+    blocks = section(page, "What was discovered").blocks
+    assert any(isinstance(block, str) and "no camera sees" in block for block in blocks)
+    assert "what turns with that wheel" in advice("unknown", made_up("unknown")[1], (shown,), whole=True)
+
+
 def test_laws_that_explain_nearly_as_much_are_named():
     law = discovered_law()._replace(alike=(Kind("speed sideways", "1", "heading"),))
     blocks = section(
