@@ -5,6 +5,7 @@ import pathlib
 import numpy as np
 
 from jaxident import plot
+from jaxident.effects.law_kinds import TURNING
 from jaxident.report.page import Figure, Page, Section, Table, write_page
 from jaxident.robot.model import Discovered
 
@@ -43,7 +44,7 @@ def law_of(law: dict) -> Discovered:
     at = np.unique([point["at"] for point in points])
     value, deviation = (np.array([point[key] for point in points]) for key in ("value", "standard_deviation"))
     if len(signals) == 1:
-        turning = {key: law[key] for key in ("period", "half_track")}
+        turning = {key: law[key] for key in TURNING}
         return Discovered(law["acts_on"], law["times"], *signals, at, value, deviation, **turning)
     second = np.unique([point["second_at"] for point in points])
     shape = len(at), len(second)

@@ -32,8 +32,9 @@ ACTS = {
 ALONG, HEADING, SIDEWAYS, WHEELS, AHEAD, LEFT, TURN, *OF_ONE_WHEEL = ACTS
 BY_CAMERA, PUSHES, ROLLINGS = (AHEAD, LEFT, TURN), tuple(OF_ONE_WHEEL[:2]), tuple(OF_ONE_WHEEL[2:])
 ANGLE = "own angle"
-"""The signal of a law for one wheel: this wheel's angle. What it was when a run began, nobody knows: it is found in the
-first poses of the run."""
+"""The signal of a law for one wheel: this wheel's angle. Nobody knows what it is when a run begins; poses tell it."""
+TURNING = ("period", "half_track")
+"""What such a law has beside its curve (`Discovered`)."""
 SIGNALS = {
     "v": "m/s", "w": "rad/s", "heading": "rad", "x": "m", "y": "m", "time": "s", "push right": UNIT,
     "push left": UNIT, "since reversal": "s", "own speed": UNIT, "own push": UNIT, **dict.fromkeys(HEATS, SQUARE),
@@ -117,7 +118,7 @@ def _check_angle(law: Discovered) -> None:
     by_angle = ANGLE in (law.signal, law.second_signal)
     if by_angle != (law.acts_on in OF_ONE_WHEEL) or (by_angle and law.second_signal):
         raise InputError(f"discovered: a law for one wheel is a curve of its {ANGLE}, and no other law is")
-    numbers = [number for number in (law.period, law.half_track) if number is not None]
+    numbers = [number for key in TURNING if (number := getattr(law, key)) is not None]
     if len(numbers) != 2 * by_angle or not np.all(np.isfinite(numbers)) or (by_angle and law.period <= 0.0):
         raise InputError(f"discovered: a curve of the {ANGLE}, and no other, has a period above 0 and a half_track")
 

@@ -62,10 +62,10 @@ def predict(
     """Predict the poses of a log from its commands, in free runs from many rows of it.
 
     Free runs begin at rows burn_in, burn_in + stride, ... of each run. A physical model, with effects or without,
-    begins from the state that a filter finds in the rows before (`run_ahead`). Where the filter does not converge, the
-    free run begins from the speed that earlier commands give from rest, at the last pose. A model of free numerators is
-    fitted to the poses of the burn-in. A UserWarning tells of free runs that leave what a discovered law has seen.
-    Needs double precision.
+    begins from the state that a filter finds in the rows before (`run_ahead`); they also tell the angles of wheels that
+    discovered laws go by. Where the filter does not converge, the free run begins from the speed that earlier commands
+    give from rest, at the last pose. A model of free numerators is fitted to the poses of the burn-in. A UserWarning
+    tells of free runs that leave what a discovered law has seen. Needs double precision.
 
     Args:
         model: the robot.

@@ -9,7 +9,7 @@ import numpy as np
 
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.effect import UNIT
-from jaxident.effects.law_kinds import SIGNALS, knots_by_signal, value_unit
+from jaxident.effects.law_kinds import SIGNALS, TURNING, knots_by_signal, value_unit
 from jaxident.export.split import ANY, CAMERA, COUPLING, DEAD_ZONE, EVERY, GAIN, RATE, SLIP, Target
 from jaxident.export.text import number, origin
 from jaxident.robot.model import Discovered, Model
@@ -109,11 +109,10 @@ def _law_rows(law: Discovered, model: Model) -> list[Row]:
         [f"{signal} at {float(at):.4g} {SIGNALS[signal]}" for at in knots]
         for signal, knots in knots_by_signal(law).items()
     ]
-    turning = {"period": law.period, "half_track": law.half_track}
     wheel = [
         _row(f"discovered: {law.acts_on}", name, value, "m", float("nan"), False, model)
-        for name, value in turning.items()
-        if value is not None
+        for name in TURNING
+        if (value := getattr(law, name)) is not None
     ]
     return wheel + [
         _row(f"discovered: {law.acts_on}", f"{factor}{', '.join(at)}", value, value_unit(law), _or_nan(own),

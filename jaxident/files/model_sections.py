@@ -10,7 +10,7 @@ import numpy as np
 
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.checks import check_parameters
-from jaxident.effects.law_kinds import check_discovered
+from jaxident.effects.law_kinds import TURNING, check_discovered
 from jaxident.errors import InputError
 from jaxident.files.schema import Shape, take_array, take_keys, take_list, take_number, take_object, take_text
 from jaxident.robot.drive import Physical
@@ -140,8 +140,6 @@ def write_effect(effect: Effect) -> dict[str, Any]:
 
 SECOND = ("second_signal", "second_at")
 """Keys of a law that is a surface."""
-TURNING = ("period", "half_track")
-"""Keys of a law that goes by the angle of a wheel."""
 
 
 def read_discovered(value: Any, where: str) -> tuple[Discovered, ...]:

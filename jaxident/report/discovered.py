@@ -27,8 +27,8 @@ SEEN = (
     "last value. That is a guess: `predict` warns where it is made, and is less sure there."
 )
 OF_WHEEL = (
-    "How a wheel stands when a run begins, no camera sees, and it differs from run to run. The angle of 0 is where the "
-    "law is largest. `predict` finds the angle in the poses before each start, and is less sure where there are few. "
+    "No camera sees how a wheel stands, and each run begins at another angle. The angle of 0 is where the law is "
+    "largest. `predict` finds the angle in the poses before each start, and is less sure where there are few. "
     "`simulate` draws one."
 )
 OF_CURVE = "Line: the curve; shade: two standard deviations; grey bars: how often the robot was there. "

@@ -321,7 +321,7 @@ def test_a_law_of_a_wheel_is_told_with_how_far_it_rolls_from_turn_to_turn():
     told = "push of that wheel times a curve of the angle of that wheel, once every 189 mm of its way"
     assert f"to the push of the right wheel comes {told}" in page.lead
     blocks = section(page, "What was discovered").blocks
-    assert any(isinstance(block, str) and "no camera sees" in block for block in blocks)
+    assert any(isinstance(block, str) and "No camera sees" in block for block in blocks)
     assert "what turns with that wheel" in advice("unknown", made_up("unknown")[1], (shown,), whole=True)
 
 

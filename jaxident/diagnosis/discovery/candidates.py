@@ -33,6 +33,7 @@ from jaxident.effects.law_kinds import (
     WHEELS,
     remembered,
 )
+from jaxident.estimation.poses.ways import way_and_turn
 
 _left_behind = jax.jit(left_behind)
 KNOTS = 10
@@ -103,16 +104,8 @@ def path_of(fit: Solution, windows: Windows, laws: Laws | None = None) -> Path:
     own = {"1": np.ones_like(push), "own speed": speeds, "own push": push}
     own |= {name: np.asarray(part).transpose(2, 0, 1) for name, part in remembered(past, axis=1).items()}
     seen = np.repeat(np.asarray(windows.seen).T, 3, axis=1)
-    way, turn = (begin[:, None] + since for begin, since in zip(windows.way, _since(x, y, theta), strict=True))
+    way, turn = (begin[:, None] + since for begin, since in zip(windows.way, way_and_turn(x, y, theta), strict=True))
     return Path(signals, own, gain, rates, seen, way, turn, step)
-
-
-def _since(x: Array, y: Array, theta: Array) -> tuple[np.ndarray, np.ndarray]:
-    """Way [m] and turn [rad] since the first row of each window."""
-    turned = np.diff(theta, axis=1, prepend=theta[:, :1])
-    middle = theta - 0.5 * turned
-    moved = [np.diff(place, axis=1, prepend=place[:, :1]) for place in (x, y)]
-    return np.cumsum(moved[0] * np.cos(middle) + moved[1] * np.sin(middle), axis=1), np.cumsum(turned, axis=1)
 
 
 def candidates(path: Path, responses: Responses) -> Iterator[Candidate]:
@@ -128,7 +121,7 @@ def candidates(path: Path, responses: Responses) -> Iterator[Candidate]:
             yield Candidate(kind, at, columns_of(kind, at, path, responses), density)
 
 
-def by_angle(kind: Kind, turning: Turning, path: Path, responses: Responses) -> Candidate:
+def of_wheel(kind: Kind, turning: Turning, path: Path, responses: Responses) -> Candidate:
     """A law of a kind that goes by the angle of a wheel."""
     at = (np.linspace(-np.pi, np.pi, KNOTS),)
     columns = columns_of(kind, at, path, responses, turning)

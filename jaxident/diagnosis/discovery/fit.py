@@ -16,7 +16,7 @@ from jaxident.diagnosis.motion.windows import Windows
 from jaxident.diagnosis.noise.law import Law
 from jaxident.effects.coordinates import limits
 from jaxident.effects.law_arrays import Laws, laws_of
-from jaxident.effects.law_kinds import scaled
+from jaxident.effects.law_kinds import TURNING, scaled
 from jaxident.robot.model import Discovered
 
 MOST_STEPS = 10
@@ -78,7 +78,7 @@ def as_law(curve: Curve, largest: float = 1.0) -> Discovered:
     """A curve as a model holds it, in the user's unit."""
     kind, (at, *second), shape = curve.kind, curve.at, [len(knots) for knots in curve.at]
     value, deviation = (np.reshape(column, shape) for column in (curve.value, curve.deviation))
-    turning = {} if curve.turning is None else {key: getattr(curve.turning, key) for key in ("period", "half_track")}
+    turning = {} if curve.turning is None else {key: getattr(curve.turning, key) for key in TURNING}
     law = Discovered(kind.acts_on, kind.times, kind.signal, at, value, deviation, kind.second_signal,
                      second[0] if second else None, **turning)  # fmt: skip
     return scaled(law, largest)

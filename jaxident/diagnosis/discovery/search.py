@@ -13,7 +13,7 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.causes.finding import Finding
 from jaxident.diagnosis.causes.search_rounds import SURE
 from jaxident.diagnosis.causes.settled import LIKELY, whiten
-from jaxident.diagnosis.discovery.candidates import by_angle, candidates, path_of
+from jaxident.diagnosis.discovery.candidates import candidates, of_wheel, path_of
 from jaxident.diagnosis.discovery.curves import Bent, bend
 from jaxident.diagnosis.discovery.fit import (
     Bending,
@@ -99,7 +99,7 @@ def worthy(data: Data, fit: Solution, curves: tuple[Curve, ...]) -> list[Worthy]
     found: list[Worthy] = []
     path = path_of(fit, data.windows, laws_from(curves, data.windows))
     turning = turnings(data, fit, base, path, responses)
-    periodic = (by_angle(*pair, path, responses) for pair in turning)
+    periodic = (of_wheel(*pair, path, responses) for pair in turning)
     for each in itertools.chain(candidates(path, responses), periodic):
         if any(each.kind == curve.kind for curve in curves):
             continue

@@ -27,13 +27,14 @@ a second on, what comes once in 0.5 m was not found on a slow robot; no others w
 PLACES = (0.3, 1.2)
 """Half track over what gains and rates say: less than one where wheels slide in turns. No others were tried."""
 APART = 1.0
-"""Angle [rad] at the end of a window, or of a run, from one k or q to the next. With 0.7 the same was found on three
-robots."""
+"""Angle [rad] that two neighbouring patterns are apart at the end of a window, or of a part of a run. With 0.7 the same
+was found on three robots."""
 LONGEST = 32
 """Windows over which a pattern is added up: the angle is free again in the next ones. So a long log takes no more
 patterns than a short one. No other number was tried."""
 NARROW = 4.0
-"""How much further than nine windows of ten the widest one may go before it sets the steps. No other was tried."""
+"""Steps go by how far nine windows of ten go. If one goes more than NARROW times as far, they go by a part of that: a
+robot that mostly stands would ask for thousands of patterns. No other was tried."""
 ZOOMS, AROUND = 4, np.linspace(-2.0, 2.0, 9)
 """Times that the search looks closer, and where then, in steps of the grid before; the next grid is half as wide. No
 others were tried."""

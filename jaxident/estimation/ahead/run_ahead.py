@@ -72,7 +72,7 @@ def run_ahead(model: Model, log: Log, starts: Starts, horizon: int, *, burn_in: 
     """
     noise = jax.tree.map(np.float64, noise_for(model, until_last_start(log, starts)))  # one type, one program
     slips = float(noise.slip_along) > 0.0 or float(noise.slip_heading) > 0.0
-    before = max(burn_in, FORGOTTEN) if slips or by_angle(model) else burn_in
+    before = max(burn_in, FORGOTTEN) if slips or laws_of_wheels(model) else burn_in
     step = float(np.median(np.concatenate([np.diff(run.t) for run in log.runs()])))
     first = int(np.ceil(RUN_UP / step)) + before
     chance = {effect.name: effect.parameters for effect in model.effects}
@@ -99,14 +99,14 @@ def run_ahead(model: Model, log: Log, starts: Starts, horizon: int, *, burn_in: 
         return np.moveaxis(run(robot, phase, stretch, sure).pose[ahead], -1, 0)
 
     slopes = [_less(there(other, phase, sure), pose) / size for other, size in directions(model)]
-    for k in by_angle(model):
+    for k in laws_of_wheels(model):
         whole, turn = np.ones(sure.shape), ANGLE_STEP * (np.arange(MOST_LAWS) == k)[:, None]
         slope = _less(there(model, phase + turn, whole), there(model, phase, whole)) / ANGLE_STEP
         slopes.append(slope * np.minimum(deviation[k], 1.0)[:, None, None])  # an angle that may be any: as a sine's
     return Ahead(pose, begin, slip, np.array(slopes).reshape(-1, *pose.shape), run_up)
 
 
-def by_angle(model: Model) -> list[int]:
+def laws_of_wheels(model: Model) -> list[int]:
     """The laws that go by the angle of a wheel."""
     return [k for k, law in enumerate(model.discovered) if law.signal == ANGLE]
 
@@ -117,7 +117,7 @@ def _phases(
     """Phases (laws, starts) of the wheels that laws go by where the filter of each start begins, and their deviations
     [rad]; first: row of the starts in their stretches."""
     none, laws = np.zeros((MOST_LAWS, len(starts.row))), laws_of(model.discovered)
-    if laws is None or not by_angle(model):
+    if laws is None or not laws_of_wheels(model):
         return none, none
     anchors, own = np.unique(followed(starts), return_inverse=True)
     part = jax.tree.map(lambda axis, leaf: np.take(leaf, anchors, axis), AXES, stretch)
@@ -130,10 +130,10 @@ def _phases(
         found = run(model, phases, many, acts)
         return found.innovation[: first + 1].sum(axis=0).reshape(count, -1)
 
-    phase, _ = phases_of(partial(misfit, part), by_angle(model), (MOST_LAWS, len(anchors)))
+    phase, _ = phases_of(partial(misfit, part), laws_of_wheels(model), (MOST_LAWS, len(anchors)))
     gone = ways(log.runs())[:, starts.run, np.maximum(starts.row - first + stretch.first, 0)]
     phase = phase[:, own] + laws.per_way @ (gone - gone[:, anchors[own]])
-    return closer(partial(misfit, stretch), by_angle(model), phase)
+    return closer(partial(misfit, stretch), laws_of_wheels(model), phase)
 
 
 def _less(pose: Array, other: Array) -> np.ndarray:

@@ -8,7 +8,7 @@ from jaxident.array_types import Array
 from jaxident.estimation.ahead.stretches import Starts
 
 GRID = 12
-"""Angles that are tried, round the circle."""
+"""Angles that are tried, round the circle. No other number was tried."""
 CLOSER = 3.0
 """How much closer together three angles are that are tried about the best one. No other was tried."""
 FOLLOWED = 100

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from jaxident.estimation.poses.ways import ways
+from jaxident.estimation.poses.ways import way_and_turn, ways
 from jaxident.log import make_log
 
 STEP, ROWS = 0.05, 400
@@ -52,3 +52,11 @@ def test_a_run_without_poses_goes_nowhere():
     log, _ = driven()
     blind = log._replace(x=np.full(ROWS, np.nan))
     np.testing.assert_array_equal(ways([blind]), 0.0)
+
+
+def test_ways_of_several_windows_are_those_of_each():
+    log, _ = driven()
+    pose = np.stack(log.pose)[:, :396].reshape(3, 4, 99)
+    way, turn = way_and_turn(*pose)
+    for k in range(4):
+        np.testing.assert_allclose((way[k], turn[k]), ways([log.rows(99 * k, 99 * k + 99)])[:, 0])
