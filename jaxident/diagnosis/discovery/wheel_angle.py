@@ -41,13 +41,12 @@ others were tried."""
 
 
 class _Seen(NamedTuple):
-    """Of a kind of law: white answers of the poses to a unit in each row (windows, numbers, rows), and what is to be
-    explained (windows, numbers); what the poses ask for in each row (windows, rows), the product of both; way and turn
-    since the window's first row (windows, rows), and those of this row in its run (windows,); the windows of each part
-    of a run."""
+    """Of the kinds of laws of one wheel: products of white answers of the poses to a unit in each row (kinds, windows,
+    rows, rows), and their products with what is to be explained, which the poses ask for in each row (kinds, windows,
+    rows); way and turn since the window's first row (windows, rows), and those of this row in its run (windows,); the
+    windows of each part of a run."""
 
-    answers: Array
-    residual: Array
+    products: Array
     asked: Array
     way: Array
     turn: Array
@@ -63,7 +62,7 @@ Found = list[tuple[Kind, Turning]]
 def turnings(data: Data, fit: Solution, base: Array, path: Path, responses: Responses) -> Found:
     """For each wheel and each kind of law that goes by its angle the pattern that the poses ask for most; base
     (windows, numbers, n): whitened columns of a fit free of start states, the residual last."""
-    sought: list[tuple[Kind, float, float]] = []
+    sought: list[tuple[list[Kind], float, float]] = []
     if not (np.isfinite(path.way).all() and np.isfinite(path.turn).all()):
         return []
     for number, (push, roll) in enumerate(zip(PUSHES, ROLLINGS, strict=True)):
@@ -71,14 +70,15 @@ def turnings(data: Data, fit: Solution, base: Array, path: Path, responses: Resp
         if along == 0.0 or heading == 0.0:
             continue  # a wheel that does nothing, of a robot that coasts
         half, side = abs(float(along / heading)), float(np.sign(along * heading))
-        kinds = Kind(push, "1", ANGLE), Kind(push, "own push", ANGLE), Kind(roll, "own speed", ANGLE)
-        sought += [(kind, half, side) for kind in kinds]
+        kinds = [Kind(push, "1", ANGLE), Kind(push, "own push", ANGLE), Kind(roll, "own speed", ANGLE)]
+        sought.append((kinds, half, side))
     residual = _left(base)
 
-    def strongest(kind: Kind, half: float, side: float) -> tuple[Kind, Turning]:
-        return kind, _strongest(_seen(data, fit, residual, path, responses, kind), path, half, side)
+    def strongest(kinds: list[Kind], half: float, side: float) -> Found:
+        found = _strongest(_seen(data, fit, residual, path, responses, kinds), path, half, side)
+        return list(zip(kinds, found, strict=True))
 
-    return in_parallel(strongest, sought)
+    return [pair for found in in_parallel(strongest, sought) for pair in found]
 
 
 def _left(base: Array) -> np.ndarray:
@@ -89,15 +89,18 @@ def _left(base: Array) -> np.ndarray:
     return (residual - columns / length @ size).reshape(base.shape[:2])
 
 
-def _seen(data: Data, fit: Solution, residual: Array, path: Path, responses: Responses, kind: Kind) -> _Seen:
-    """What the poses ask for in each row, of a kind."""
+def _seen(data: Data, fit: Solution, residual: Array, path: Path, responses: Responses, kinds: list[Kind]) -> _Seen:
+    """What the poses ask for in each row, of some kinds."""
     count, rows = path.way.shape
     unit = np.broadcast_to(np.eye(rows), (count, rows, rows))
-    answers, _ = without_starts(data.whitener, answers_of(kind, unit, path, responses), fit.linear.starts)
-    asked = (answers.transpose(0, 2, 1) @ residual[..., None])[..., 0]
+    products, asked = np.empty((len(kinds), count, rows, rows)), np.empty((len(kinds), count, rows))
+    for k, kind in enumerate(kinds):
+        answers, _ = without_starts(data.whitener, answers_of(kind, unit, path, responses), fit.linear.starts)
+        turned_over = answers.transpose(0, 2, 1)
+        products[k], asked[k] = turned_over @ answers, (turned_over @ residual[..., None])[..., 0]
     gone, turned = path.way[:, 0], path.turn[:, 0]
     parts = _parts(np.asarray(data.windows.run))
-    return _Seen(answers, residual, asked, path.way - gone[:, None], path.turn - turned[:, None], gone, turned, parts)
+    return _Seen(products, asked, path.way - gone[:, None], path.turn - turned[:, None], gone, turned, parts)
 
 
 def _parts(run: Array) -> list[np.ndarray]:
@@ -106,9 +109,9 @@ def _parts(run: Array) -> list[np.ndarray]:
     return [part for own in whole for part in np.array_split(own, int(np.ceil(len(own) / LONGEST)))]
 
 
-def _strongest(seen: _Seen, path: Path, half: float, side: float) -> Turning:
-    """The pattern of the largest sum over all parts of runs, of a wheel about `half` [m] from the middle on one side (1
-    right, -1 left)."""
+def _strongest(seen: _Seen, path: Path, half: float, side: float) -> list[Turning]:
+    """Of each kind the pattern of the largest sum over all parts of runs, of a wheel about `half` [m] from the middle
+    on one side (1 right, -1 left)."""
     (k_step, more_k), (q_step, more_q) = (
         _steps(seen, *parts) for parts in ((seen.way, seen.gone), (seen.turn, seen.turned))
     )
@@ -117,15 +120,21 @@ def _strongest(seen: _Seen, path: Path, half: float, side: float) -> Turning:
     q_all = np.arange(PLACES[0] * k_all[0] * half, PLACES[1] * k_all[-1] * half + q_step, q_step)
     waves = _waves(seen.turn, side * q_all) * _waves(seen.turned, side * q_all)[:, None]
     finer = _waves(seen.gone, more_k), _waves(seen.turned, side * more_q)
-    best, count = (-1.0, 0.0, 0.0), 0
+    best, count = [(-1.0, 0.0, 0.0)] * len(seen.asked), 0
     for k in k_all:
-        near = np.flatnonzero((q_all >= PLACES[0] * k * half) & (q_all <= PLACES[1] * k * half + q_step))
-        power = _powers(seen, k, waves[..., near], *finer)
-        count += power.size
-        i, j, m = np.unravel_index(power.argmax(), power.shape)
-        best = max(best, (float(power[i, j, m]), k + more_k[i], side * (q_all[near][j] + more_q[m])))
-    k, q, phase = _closer(seen, best, k_step / len(more_k), q_step / len(more_q))
-    return Turning(2.0 * np.pi / k, q / k, phase, best[0], _by_chance(seen.parts, count))
+        near = slice(*np.searchsorted(q_all, [PLACES[0] * k * half, PLACES[1] * k * half + q_step]))
+        powers = _powers(seen, k, waves[..., near], *finer)
+        count += powers[0].size
+        for kind, power in enumerate(powers):
+            i, j, m = np.unravel_index(power.argmax(), power.shape)
+            there = float(power[i, j, m]), float(k + more_k[i]), float(side * (q_all[near][j] + more_q[m]))
+            best[kind] = max(best[kind], there)
+    steps, chance = (k_step / len(more_k), q_step / len(more_q)), _by_chance(seen.parts, count)
+    closer = [_closer(seen, kind, *there[1:], *steps) for kind, there in enumerate(best)]
+    return [
+        Turning(2.0 * np.pi / k, q / k, phase, there[0], chance)
+        for (k, q, phase), there in zip(closer, best, strict=True)
+    ]
 
 
 def _steps(seen: _Seen, since: Array, begun: Array) -> tuple[float, np.ndarray]:
@@ -144,41 +153,42 @@ def _waves(way: Array, rate: Array) -> np.ndarray:
 
 
 def _powers(seen: _Seen, k: float, waves: Array, more_k: Array, more_q: Array) -> np.ndarray:
-    """Power (more k, q, more q) of patterns at k and some q, waves (windows, rows, q), each moved by little, waves
-    (windows, more) at the first row of each window."""
+    """Power (kinds, more k, q, more q) of patterns at k and some q, waves (windows, rows, q), each moved by little,
+    waves (windows, more) at the first row of each window."""
     asked = seen.asked * np.exp(1j * k * (seen.gone[:, None] + seen.way))
-    each = (asked.astype(np.complex64)[:, None] @ waves)[:, 0]
-    moved = each[..., None] * more_q[:, None]
+    each = asked.astype(np.complex64).transpose(1, 0, 2) @ waves
+    moved = each[..., None] * more_q[:, None, None]
     total: Array = 0.0
     for own in seen.parts:
         whole = np.tensordot(more_k[own], moved[own], axes=(0, 0))
         squares = np.maximum(np.sum(np.abs(each[own]) ** 2, axis=0), 1e-30)
-        total = total + (whole.real**2 + whole.imag**2) / squares[:, None]
-    return total
+        total = total + (whole.real**2 + whole.imag**2) / squares[..., None]
+    return total.swapaxes(0, 1)
 
 
-def _closer(seen: _Seen, best: tuple[float, float, float], k_step: float, q_step: float) -> tuple:
-    """k, q and phases (windows,) of the pattern that explains most near some k and q."""
-    _, k, q = best
+def _closer(seen: _Seen, kind: int, k: float, q: float, k_step: float, q_step: float) -> tuple:
+    """k, q and phases (windows,) of the pattern of a kind that explains most near some k and q."""
     for zoom in range(ZOOMS):
         grid = np.meshgrid(k + 0.5**zoom * k_step * AROUND, q + 0.5**zoom * q_step * AROUND)
         k_near, q_near = (part.ravel() for part in grid)
-        gain = _explained(seen, k_near, q_near)[0]
+        gain = _explained(seen, kind, k_near, q_near)[0]
         k, q = k_near[gain.argmax()], q_near[gain.argmax()]
     phase = np.zeros(len(seen.gone))
-    for own, angle in zip(seen.parts, _explained(seen, np.array([k]), np.array([q]))[1][:, 0], strict=True):
+    for own, angle in zip(seen.parts, _explained(seen, kind, np.array([k]), np.array([q]))[1][:, 0], strict=True):
         phase[own] = angle
     return k, q, phase
 
 
-def _explained(seen: _Seen, k: Array, q: Array) -> tuple[np.ndarray, np.ndarray]:
-    """Half the squares that patterns k (n,), q (n,) of any size and phase in each part of a run explain (n,), and these
-    phases (parts, n)."""
+def _explained(seen: _Seen, kind: int, k: Array, q: Array) -> tuple[np.ndarray, np.ndarray]:
+    """Half the squares that patterns k (n,), q (n,) of a kind, of any size and phase in each part of a run, explain
+    (n,), and these phases (parts, n)."""
     angle = (seen.gone[:, None] + seen.way)[..., None] * k + (seen.turned[:, None] + seen.turn)[..., None] * q
-    cosine, sine = seen.answers @ np.cos(angle), seen.answers @ np.sin(angle)
-    residual = seen.residual[..., None]
-    pairs = (cosine, cosine), (sine, sine), (cosine, sine), (cosine, residual), (sine, residual)
-    cc, ss, cs, c, s = np.array([[np.sum(a[own] * b[own], axis=(0, 1)) for own in seen.parts] for a, b in pairs])
+    cosine, sine = np.cos(angle), np.sin(angle)
+    products, asked = seen.products[kind], seen.asked[kind][..., None]
+    to_cosine, to_sine = products @ cosine, products @ sine
+    pairs = (cosine, to_cosine), (sine, to_sine), (cosine, to_sine), (cosine, asked), (sine, asked)
+    each = [np.sum(one * other, axis=1) for one, other in pairs]
+    cc, ss, cs, c, s = np.array([[part[own].sum(axis=0) for own in seen.parts] for part in each])
     volume = np.maximum(cc * ss - cs**2, 1e-12 * cc * ss + 1e-300)
     a, b = (ss * c - cs * s) / volume, (cc * s - cs * c) / volume
     return 0.5 * np.sum(a * c + b * s, axis=0), np.arctan2(-b, a)

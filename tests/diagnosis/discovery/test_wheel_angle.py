@@ -45,7 +45,7 @@ def seen_by(rng, size: float) -> _Seen:
     gone, turned = way[:, 0], turn[:, 0]
     own = [np.flatnonzero(run == k) for k in range(RUNS)]
     unit = np.broadcast_to(np.eye(ROWS), (len(run), ROWS, ROWS))
-    return _Seen(unit, asked, asked, way - gone[:, None], turn - turned[:, None], gone, turned, own)
+    return _Seen(unit[None], asked[None], way - gone[:, None], turn - turned[:, None], gone, turned, own)
 
 
 def path() -> Path:
@@ -54,7 +54,7 @@ def path() -> Path:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_pattern_in_noise_is_found_with_its_period_and_its_place(seed):
-    found = _strongest(seen_by(np.random.default_rng(seed), 0.7), path(), 1.3 * HALF, 1.0)
+    (found,) = _strongest(seen_by(np.random.default_rng(seed), 0.7), path(), 1.3 * HALF, 1.0)
     assert abs(found.period - PERIOD) < 0.02 * PERIOD
     assert abs(found.half_track - HALF) < 0.1 * HALF
     assert found.power > found.by_chance
@@ -63,22 +63,36 @@ def test_a_pattern_in_noise_is_found_with_its_period_and_its_place(seed):
 def test_what_a_pattern_explains_is_what_a_plain_fit_explains():
     seen = seen_by(np.random.default_rng(9), 0.7)
     k, q = np.array([30.0, 33.0]), np.array([2.4, 2.6])
-    gain, phase = _explained(seen, k, q)
+    gain, phase = _explained(seen, 0, k, q)
     for n in range(2):
         angle = k[n] * (seen.gone[:, None] + seen.way) + q[n] * (seen.turned[:, None] + seen.turn)
         total = 0.0
         for run, own in enumerate(seen.parts):
             columns = np.stack([np.cos(angle[own]).ravel(), np.sin(angle[own]).ravel()], axis=1)
-            (a, b), *_ = np.linalg.lstsq(columns, seen.asked[own].ravel())
+            (a, b), *_ = np.linalg.lstsq(columns, seen.asked[0, own].ravel())
             total += 0.5 * np.sum((columns @ [a, b]) ** 2)
             best = np.cos(angle[own] + phase[run, n]).ravel()
             assert np.allclose(columns @ [a, b], np.hypot(a, b) * best)
         assert gain[n] == pytest.approx(total)
 
 
+def test_kinds_that_are_searched_together_are_found_as_each_by_itself():
+    one, other = (seen_by(np.random.default_rng(seed), 0.7) for seed in (3, 3))
+    rng = np.random.default_rng(12)
+    other = other._replace(asked=other.asked + rng.normal(size=other.asked.shape), products=2.0 * other.products)
+    both = one._replace(**{key: np.concatenate([getattr(one, key), getattr(other, key)])
+                           for key in ("products", "asked")})  # fmt: skip
+    alone = [_strongest(each, path(), 1.3 * HALF, 1.0)[0] for each in (one, other)]
+    for found, expected in zip(_strongest(both, path(), 1.3 * HALF, 1.0), alone, strict=True):
+        assert found.period == pytest.approx(expected.period)
+        assert found.half_track == pytest.approx(expected.half_track)
+        np.testing.assert_allclose(np.exp(1j * found.phase), np.exp(1j * expected.phase), atol=1e-9)
+    assert alone[0].power != alone[1].power
+
+
 def test_noise_alone_hardly_brings_more_than_it_may_by_chance():
     seen = [seen_by(np.random.default_rng(100 + seed), 0.0) for seed in range(20)]
-    found = [_strongest(each, path(), 1.3 * HALF, 1.0) for each in seen]
+    found = [_strongest(each, path(), 1.3 * HALF, 1.0)[0] for each in seen]
     over = np.array([each.power - each.by_chance for each in found])
     assert np.sum(over > 0.0) <= 4
     assert over.max() < 5.0
@@ -90,10 +104,10 @@ def test_the_power_of_patterns_is_what_a_plain_sum_says():
     seen = seen_by(np.random.default_rng(5), 0.5)
     k, q, more_k, more_q = 31.0, np.array([2.0, 2.4]), np.array([-0.2, 0.1]), np.array([0.0, 0.05, 0.1])
     waves = _waves(seen.turn, q) * _waves(seen.turned, q)[:, None]
-    found = _powers(seen, k, waves, _waves(seen.gone, more_k), _waves(seen.turned, more_q))
+    (found,) = _powers(seen, k, waves, _waves(seen.gone, more_k), _waves(seen.turned, more_q))
     for i, j, m in np.ndindex(found.shape):
         angle = k * (seen.gone[:, None] + seen.way) + q[j] * (seen.turned[:, None] + seen.turn)
-        each = np.sum(seen.asked * np.exp(1j * angle), axis=1)
+        each = np.sum(seen.asked[0] * np.exp(1j * angle), axis=1)
         moved = each * np.exp(1j * (more_k[i] * seen.gone + more_q[m] * seen.turned))
         plain = sum(abs(moved[own].sum()) ** 2 / np.sum(np.abs(each[own]) ** 2) for own in seen.parts)
         assert abs(found[i, j, m] - plain) < 1e-4 * plain
