@@ -63,10 +63,10 @@ def one(seed: int) -> dict:
 def offered(finding, rng) -> dict[str, float]:
     """What each placebo is worth, in log evidence, the better of both forces; above SURE it would be taken."""
     from jaxident.diagnosis.causes.settled import whiten
-    from jaxident.diagnosis.discovery.candidates import INSIDE, KNOTS, hats, path_of
     from jaxident.diagnosis.discovery.curves import precision
-    from jaxident.diagnosis.discovery.kinds import KINDS
     from jaxident.diagnosis.discovery.search import _base, _beside
+    from jaxident.diagnosis.laws.candidates import INSIDE, KNOTS, hats, path_of
+    from jaxident.diagnosis.laws.kinds import KINDS
     from jaxident.diagnosis.motion.responses import respond
 
     windows = finding.data.windows._replace(wheels=None, turning=None)

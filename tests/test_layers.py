@@ -41,7 +41,7 @@ SIDEWAYS = {("report", "plot"), ("report", "files"), ("plot", "files"), ("export
 """Importer and imported within a floor: files, plot, report and export stand side by side."""
 ROWS = {
     "estimation": ("increments", "poses", "ahead online uncertainty suspicions"),
-    "diagnosis": ("motion", "noise", "fit", "preparation", "causes", "discovery", "account planning"),
+    "diagnosis": ("motion", "noise", "fit", "laws", "preparation", "causes", "discovery", "account planning"),
 }
 """Inner rooms of a room, in the order in which data walk through them; its own files stand behind them all."""
 FLOOR_OF = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}

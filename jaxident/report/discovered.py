@@ -8,7 +8,7 @@ from jaxident import plot
 from jaxident.diagnosis.account.discovered import Shown
 from jaxident.diagnosis.diagnose import Diagnosis
 from jaxident.diagnosis.discovery.forms import PATCH, beyond
-from jaxident.diagnosis.discovery.kinds import Kind
+from jaxident.diagnosis.laws.kinds import Kind
 from jaxident.effects.law_kinds import ANGLE, CHANGES, SIGNAL_WORDS
 from jaxident.report.page import Figure, Section, Table
 from jaxident.report.words import number, percent, plain, together

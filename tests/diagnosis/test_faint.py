@@ -7,15 +7,17 @@ import pytest
 from support.small_robot import LAW, ROWS, RUNS, VECTOR, nominal_fit, windows_of
 
 from jaxident.diagnosis.causes.columns import tabulate
+from jaxident.diagnosis.causes.discrepancy import unexplained
 from jaxident.diagnosis.causes.discrepancy_basis import library
 from jaxident.diagnosis.causes.moves import fit_options, stands
 from jaxident.diagnosis.causes.points import at_best, points_of
 from jaxident.diagnosis.causes.search import best_set
 from jaxident.diagnosis.causes.search_rounds import search
-from jaxident.diagnosis.causes.wheel_periodicity import _travels, rhythms
 from jaxident.diagnosis.detectability import Answers, answers, replay, visible
 from jaxident.diagnosis.fit.refit import best_starts, bounds, refit
-from jaxident.diagnosis.motion.linear import follow, gram, left_over
+from jaxident.diagnosis.laws.candidates import Turning, cosine_of, path_of
+from jaxident.diagnosis.laws.kinds import Kind
+from jaxident.diagnosis.motion.linear import follow
 from jaxident.diagnosis.motion.responses import modelled_path, modelled_speeds, respond
 from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.preparation.dropped_commands import (
@@ -38,6 +40,7 @@ from jaxident.effects.coordinates import (
     to_catalogue,
 )
 from jaxident.effects.effect import EDGE
+from jaxident.effects.law_kinds import ANGLE, PUSHES
 
 
 @pytest.fixture(scope="module")
@@ -216,35 +219,20 @@ def test_a_share_of_late_commands_is_held_against_another_one():
     assert 0.0 < near < far < found.gain
 
 
-def test_rhythms_of_wheels_are_found_with_their_price(plain):
+def test_what_turns_with_a_wheel_is_told_as_unexplained(plain):
     data, nominal = plain
-    responses = respond(np.exp(nominal.vector[:2]), nominal.linear.residual, data.windows)
+    windows, responses = data.windows, respond(np.exp(nominal.vector[:2]), nominal.linear.residual, data.windows)
 
-    def gains(solution, found):
-        columns = np.stack([*(r.column for r in found), solution.linear.residual], axis=2)
-        products = gram(data.whitener, columns, solution.linear.starts).products.sum(axis=0)
-        return [left_over(products, []) - left_over(products, [k]) - r.price for k, r in enumerate(found)]
+    def told(solution):
+        return [term.name for term, _ in unexplained(data, solution, responses, LAW, sized=False).terms]
 
-    quiet = rhythms(data, nominal, responses)
-    assert max(gains(nominal, quiet)) < 9.0
-    # what the search itself calls a rhythm of the right wheel, of 3 % of the radius
-    linear = nominal.linear._replace(residual=nominal.linear.residual + 0.03 * quiet[0].column)
-    turning = nominal._replace(linear=linear)
-    loud = rhythms(data, turning, responses)
-    assert loud[0].period == pytest.approx(quiet[0].period, rel=0.1)
-    assert gains(turning, loud)[0] > 9.0
-
-
-def test_rhythms_are_looked_for_along_the_modelled_path(plain):
-    """Travel measured with the camera's noise would explain that very noise."""
-    data, nominal = plain
-    residual = nominal.linear.residual
-    pose = data.windows.pose - residual.reshape(len(residual), -1, 3).transpose(1, 0, 2)
-    quiet = data._replace(windows=data.windows._replace(pose=pose))
-    fitted = nominal._replace(linear=nominal.linear._replace(residual=0.0 * residual))
-    for noisy, clean in zip(_travels(data, nominal), _travels(quiet, fitted), strict=True):
-        np.testing.assert_allclose(noisy.gone, clean.gone, atol=1e-9)
-        np.testing.assert_allclose(noisy.push, clean.push, atol=1e-9)
+    assert not [name for name in told(nominal) if "once every" in name]
+    phase = np.linspace(0.0, 5.0, windows.run.max() + 1)[windows.run]
+    turning = Turning(0.2, 0.1, phase, 0.0, 0.0)
+    column = cosine_of(Kind(PUSHES[0], "1", ANGLE), turning, path_of(nominal, windows), responses)
+    residual = nominal.linear.residual + 0.1 * column
+    loud = nominal._replace(linear=nominal.linear._replace(residual=residual))
+    assert [name for name in told(loud) if name.startswith("push of the right wheel, once every 0.2")]
 
 
 def test_answers_are_what_least_squares_leaves_of_them(plain):

@@ -9,7 +9,7 @@ import pytest
 
 import jaxident as ji
 from jaxident.array_types import AT_REST, Pose
-from jaxident.diagnosis.discovery.kinds import KINDS
+from jaxident.diagnosis.laws.kinds import KINDS
 from jaxident.effects.catalogue import BY_KIND
 from jaxident.effects.discovered import shifted, with_laws
 from jaxident.effects.law_arrays import laws_of

@@ -13,8 +13,8 @@ from jaxident.diagnosis.account.discovered import Shown
 from jaxident.diagnosis.causes.finding import find_effects
 from jaxident.diagnosis.discovery.fit import as_law
 from jaxident.diagnosis.discovery.forms import form_of
-from jaxident.diagnosis.discovery.kinds import Kind
 from jaxident.diagnosis.discovery.search import discover
+from jaxident.diagnosis.laws.kinds import Kind
 from jaxident.diagnosis.preparation.prepare import prepare
 from jaxident.files.diagnosis import law_to_dict
 from jaxident.robot.model import Discovered

@@ -13,7 +13,7 @@ from jaxident.diagnosis.account.shrink import Shrink
 from jaxident.diagnosis.decide import Parameter, advice
 from jaxident.diagnosis.diagnose import COASTED
 from jaxident.diagnosis.discovery.forms import PATCH, Form
-from jaxident.diagnosis.discovery.kinds import Kind
+from jaxident.diagnosis.laws.kinds import Kind
 from jaxident.diagnosis.smallest_effects import smallest_sizes
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.coordinates import COORDINATES

@@ -18,8 +18,8 @@ from jaxident.diagnosis.decide import Parameter
 from jaxident.diagnosis.detectability import Replay
 from jaxident.diagnosis.diagnose import Diagnosis
 from jaxident.diagnosis.discovery.forms import Form
-from jaxident.diagnosis.discovery.kinds import Kind
 from jaxident.diagnosis.fit.refit import Solution
+from jaxident.diagnosis.laws.kinds import Kind
 from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.posterior import Cause, Judgement
 from jaxident.diagnosis.preparation.pose_screening import Frames

@@ -11,8 +11,8 @@ from jaxident.diagnosis.account.sized import beside, sized_corrected
 from jaxident.diagnosis.causes.finding import Finding
 from jaxident.diagnosis.discovery.fit import Bending, as_law
 from jaxident.diagnosis.discovery.forms import Form, form_of
-from jaxident.diagnosis.discovery.kinds import Kind
 from jaxident.diagnosis.discovery.search import discover
+from jaxident.diagnosis.laws.kinds import Kind
 from jaxident.diagnosis.noise.law import deviations
 from jaxident.diagnosis.noise.variance_uncertainty import Draws
 from jaxident.diagnosis.preparation.judging import Judged, judge_model

@@ -1,5 +1,5 @@
-"""What the best effects leave unexplained: terms of the corrector and rhythms of the wheels, beside a law of noise that
-does not take them for slip."""
+"""What the best effects leave unexplained: terms of the corrector and what turns with a wheel, beside a law of noise
+that does not take them for slip."""
 
 from typing import Any, NamedTuple
 
@@ -7,15 +7,15 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.causes.discrepancy_basis import WORTH, Term, library, pursue
-from jaxident.diagnosis.causes.wheel_periodicity import rhythms
 from jaxident.diagnosis.fit.prior import with_prior
 from jaxident.diagnosis.fit.refit import Data, Solution
-from jaxident.diagnosis.motion.linear import gram, left_over, normal, spread
+from jaxident.diagnosis.laws.candidates import cosine_of, path_of
+from jaxident.diagnosis.laws.wheel_angle import in_words, turnings
+from jaxident.diagnosis.motion.linear import gram, left_over, normal, spread, without_starts
 from jaxident.diagnosis.motion.responses import Responses
 from jaxident.diagnosis.noise.law import Law, white_whitener, whitener_of
 from jaxident.diagnosis.noise.sizing import size_noise
 
-SIDES = ("right", "left")
 UNEXPLAINED = 0.2
 """Share of all that is explained which terms in no catalogue bring, from which on slip is not sized more finely and
 channels are those of the error: it may be slip for want of a name."""
@@ -75,14 +75,14 @@ def unexplained(
 
 def _terms(data: Data, solution: Solution, responses: Responses) -> tuple[list[Term], np.ndarray]:
     """All terms and their columns (windows, numbers, terms)."""
-    corrector = library(solution.linear.residual, data.windows, responses)
-    turning = rhythms(data, solution, responses)
-    named = [
-        Term("drive", f"once every {rhythm.period:.3f} m of the {side} wheel", rhythm.price)
-        for rhythm, side in zip(turning, SIDES, strict=True)
-    ]
-    columns = np.concatenate([corrector.columns, np.stack([r.column for r in turning], axis=2)], axis=2)
-    return [*corrector.terms, *named], columns
+    corrector, linear = library(solution.linear.residual, data.windows, responses), solution.linear
+    whole = np.concatenate([linear.slopes, linear.residual[..., None]], axis=2)
+    white, _ = without_starts(data.whitener, whole, linear.starts)
+    path = path_of(solution, data.windows)
+    found = turnings(data, solution, white, path, responses)
+    named = [Term(kind.site, in_words(kind, turning), turning.by_chance) for kind, turning in found]
+    columns = [cosine_of(*pair, path, responses)[..., None] for pair in found]
+    return [*corrector.terms, *named], np.concatenate([corrector.columns, *columns], axis=2)
 
 
 def _choose(data: Data, whitener: Array, solution: Solution, terms: list[Term], answers: Array) -> Choice:

@@ -5,11 +5,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.discovery.candidates import Candidate, Turning, columns_of, path_of
 from jaxident.diagnosis.discovery.curves import precision, solved
-from jaxident.diagnosis.discovery.kinds import Kind, nominal_part
 from jaxident.diagnosis.fit.prior import unlikeliness, with_prior
 from jaxident.diagnosis.fit.refit import Data, Solution, best_starts, covariance_from
+from jaxident.diagnosis.laws.candidates import Candidate, Turning, columns_of, path_of
+from jaxident.diagnosis.laws.kinds import Kind, nominal_part
 from jaxident.diagnosis.motion.linear import Gram, Linear, gram, linearise
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.motion.windows import Windows

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.discovery.kinds import Kind, at_knots, nominal_part
+from jaxident.diagnosis.laws.kinds import Kind, at_knots, nominal_part
 from jaxident.effects.law_kinds import ANGLE, knots_by_signal
 from jaxident.robot.model import Discovered
 

@@ -13,7 +13,6 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.causes.finding import Finding
 from jaxident.diagnosis.causes.search_rounds import SURE
 from jaxident.diagnosis.causes.settled import LIKELY, whiten
-from jaxident.diagnosis.discovery.candidates import candidates, of_wheel, path_of
 from jaxident.diagnosis.discovery.curves import Bent, bend
 from jaxident.diagnosis.discovery.fit import (
     Bending,
@@ -24,10 +23,11 @@ from jaxident.diagnosis.discovery.fit import (
     refit_with,
     smoothness,
 )
-from jaxident.diagnosis.discovery.kinds import KINDS
-from jaxident.diagnosis.discovery.wheel_angle import turnings
 from jaxident.diagnosis.fit.prior import with_prior
 from jaxident.diagnosis.fit.refit import Data, Solution
+from jaxident.diagnosis.laws.candidates import candidates, of_wheel, path_of
+from jaxident.diagnosis.laws.kinds import KINDS
+from jaxident.diagnosis.laws.wheel_angle import turnings
 from jaxident.diagnosis.motion.linear import without_starts
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.motion.windows import Windows

@@ -10,8 +10,8 @@ from support.small_robot import LAW, nominal_fit, robot_with, windows_of
 from jaxident.diagnosis.account.needless import _owners, _without_laws, needless
 from jaxident.diagnosis.diagnose import worse
 from jaxident.diagnosis.discovery.fit import Bending, Curve, refit_with
-from jaxident.diagnosis.discovery.kinds import Kind
 from jaxident.diagnosis.fit.refit import refit
+from jaxident.diagnosis.laws.kinds import Kind
 
 AT = np.linspace(-1.0, 1.0, 10)
 LAW_OF_PUSH = Curve(Kind("push of each wheel", "1", "own push"), (AT,), np.zeros(10), np.zeros(10), 1e-2, np.ones(10))

@@ -8,12 +8,12 @@ import pytest
 
 import jaxident as ji
 from jaxident.diagnosis.causes.finding import find_effects
-from jaxident.diagnosis.discovery.candidates import SURFACE_KNOTS, Path, Turning, columns_of, hats
 from jaxident.diagnosis.discovery.curves import bend, precision, solved
 from jaxident.diagnosis.discovery.fit import Curve, as_law, prior_of
 from jaxident.diagnosis.discovery.forms import beyond, form_of
-from jaxident.diagnosis.discovery.kinds import KINDS, Kind, nominal_part
 from jaxident.diagnosis.discovery.search import discover
+from jaxident.diagnosis.laws.candidates import SURFACE_KNOTS, Path, Turning, columns_of, hats
+from jaxident.diagnosis.laws.kinds import KINDS, Kind, nominal_part
 from jaxident.diagnosis.motion.responses import Responses
 from jaxident.diagnosis.preparation.prepare import prepare
 from jaxident.effects.coordinates import PLACES

@@ -5,10 +5,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from jaxident.diagnosis.discovery import wheel_angle
-from jaxident.diagnosis.discovery.candidates import Path
 from jaxident.diagnosis.discovery.curves import precision
-from jaxident.diagnosis.discovery.wheel_angle import (
+from jaxident.diagnosis.fit.refit import Data, Solution
+from jaxident.diagnosis.laws import wheel_angle
+from jaxident.diagnosis.laws.candidates import Path
+from jaxident.diagnosis.laws.wheel_angle import (
     _explained,
     _parts,
     _powers,
@@ -18,7 +19,6 @@ from jaxident.diagnosis.discovery.wheel_angle import (
     _waves,
     turnings,
 )
-from jaxident.diagnosis.fit.refit import Data, Solution
 from jaxident.diagnosis.motion.linear import Linear
 from jaxident.diagnosis.motion.responses import Responses
 

@@ -13,9 +13,9 @@ import numpy as np
 from jax.scipy.special import gammaincc
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.discovery.candidates import Path, Turning, answers_of
-from jaxident.diagnosis.discovery.kinds import Kind
 from jaxident.diagnosis.fit.refit import Data, Solution
+from jaxident.diagnosis.laws.candidates import Path, Turning, answers_of
+from jaxident.diagnosis.laws.kinds import Kind
 from jaxident.diagnosis.motion.linear import without_starts
 from jaxident.diagnosis.motion.responses import Responses
 from jaxident.effects.law_kinds import ANGLE, PUSHES, ROLLINGS
@@ -57,6 +57,13 @@ class _Seen(NamedTuple):
 
 Found = list[tuple[Kind, Turning]]
 """Kinds of laws, and what each goes by."""
+VARIES = {"1": "push", "own push": "gain", "own speed": "radius"}
+"""What varies as a wheel turns, by what a law's curve is multiplied with."""
+
+
+def in_words(kind: Kind, turning: Turning) -> str:
+    """What of which wheel varies, and how often."""
+    return f"{VARIES[kind.times]} {kind.acts_on.partition(' ')[2]}, once every {turning.period:.3f} m"
 
 
 def turnings(data: Data, fit: Solution, base: Array, path: Path, responses: Responses) -> Found:

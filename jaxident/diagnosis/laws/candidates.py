@@ -11,8 +11,8 @@ import jax
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.diagnosis.discovery.kinds import KINDS, Kind
 from jaxident.diagnosis.fit.refit import Solution
+from jaxident.diagnosis.laws.kinds import KINDS, Kind
 from jaxident.diagnosis.motion.linear import motion_of
 from jaxident.diagnosis.motion.paths import left_behind
 from jaxident.diagnosis.motion.responses import Responses
@@ -126,6 +126,11 @@ def of_wheel(kind: Kind, turning: Turning, path: Path, responses: Responses) -> 
     at = (np.linspace(-np.pi, np.pi, KNOTS),)
     columns = columns_of(kind, at, path, responses, turning)
     return Candidate(kind, at, columns, _nearest(_signals(kind, path, turning), at), turning)
+
+
+def cosine_of(kind: Kind, turning: Turning, path: Path, responses: Responses) -> np.ndarray:
+    """Answers of the poses (windows, numbers) to the cosine of a wheel's angle in the place of a law's curve."""
+    return answers_of(kind, np.cos(_angle(turning, path))[..., None], path, responses)[..., 0]
 
 
 def _angle(turning: Turning, path: Path) -> np.ndarray:
