@@ -155,8 +155,10 @@ def _steps(seen: _Seen, since: Array, begun: Array) -> tuple[float, np.ndarray]:
 
 
 def _waves(way: Array, rate: Array) -> np.ndarray:
-    """exp(i rate way) (..., rates); single precision halves the time, and angles are small."""
-    return np.exp(1j * way[..., None] * rate).astype(np.complex64)
+    """exp(i rate way) (..., rates). Sines of single precision take an eighth of the time; at 10,000 rad they are off by
+    0.001."""
+    angle = (way[..., None] * rate).astype(np.float32)
+    return np.cos(angle) + np.complex64(1j) * np.sin(angle)
 
 
 def _powers(seen: _Seen, k: float, waves: Array, more_k: Array, more_q: Array) -> np.ndarray:
@@ -190,7 +192,7 @@ def _explained(seen: _Seen, kind: int, k: Array, q: Array) -> tuple[np.ndarray, 
     """Half the squares that patterns k (n,), q (n,) of a kind, of any size and phase in each part of a run, explain
     (n,), and these phases (parts, n)."""
     angle = (seen.gone[:, None] + seen.way)[..., None] * k + (seen.turned[:, None] + seen.turn)[..., None] * q
-    cosine, sine = np.cos(angle), np.sin(angle)
+    cosine, sine = (wave(angle.astype(np.float32)).astype(float) for wave in (np.cos, np.sin))  # as in `_waves`
     products, asked = seen.products[kind], seen.asked[kind][..., None]
     to_cosine, to_sine = products @ cosine, products @ sine
     pairs = (cosine, to_cosine), (sine, to_sine), (cosine, to_sine), (cosine, asked), (sine, asked)
