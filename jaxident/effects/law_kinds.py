@@ -8,7 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxident.effects.effect import UNIT
-from jaxident.effects.past import CHANGE_TIMES, HEAT_TIMES, Past
+from jaxident.effects.past import CHANGE_TIMES, HEAT_TIMES, REVERSAL_TIMES, Past
 from jaxident.errors import InputError
 from jaxident.robot.model import Discovered
 
@@ -17,6 +17,9 @@ HEATS = {f"own heat {tau:g} s": tau for tau in HEAT_TIMES}
 CHANGES = {f"own change {tau:g} s": tau for tau in CHANGE_TIMES}
 MEMORIES = HEATS | CHANGES
 """Signals that remember the wheel's own command, and the time constant [s] of each."""
+REVERSALS = {"since reversal" + (f" {tau:g} s" if tau else ""): tau for tau in REVERSAL_TIMES}
+DIRECTIONS = {"direction" + (f" {tau:g} s" if tau else ""): tau for tau in REVERSAL_TIMES}
+"""The time since a mean of the commands last changed its sign, and this sign; time constant [s] of each mean."""
 DISCOVERED = "discovered"
 """The key of laws among the settings of a program."""
 MOST_LAWS, MOST_KNOTS, MOST_SURFACE_KNOTS = 3, 16, 9
@@ -37,16 +40,18 @@ TURNING = ("period", "half_track")
 """What such a law has beside its curve (`Discovered`)."""
 SIGNALS = {
     "v": "m/s", "w": "rad/s", "heading": "rad", "x": "m", "y": "m", "time": "s", "push right": UNIT,
-    "push left": UNIT, "since reversal": "s", "own speed": UNIT, "own push": UNIT, **dict.fromkeys(HEATS, SQUARE),
-    **dict.fromkeys(CHANGES, UNIT), ANGLE: "rad",
+    "push left": UNIT, **dict.fromkeys(REVERSALS, "s"), "own speed": UNIT, "own push": UNIT,
+    **dict.fromkeys(HEATS, SQUARE), **dict.fromkeys(CHANGES, UNIT), ANGLE: "rad",
 }  # fmt: skip
-"""What a curve may depend on, and the unit. time: session time. since reversal: since the commands' sum last changed
-its sign (`past`). own: of the wheel that is pushed; its speed is in the commands that hold it, its heat a mean of its
-squared command over some seconds, its change the command less the mean over them."""
+"""What a curve may depend on, and the unit. time: session time. since reversal: since the commands' sum, or its mean
+over some seconds, last changed its sign (`past`). own: of the wheel that is pushed; its speed is in the commands that
+hold it, its heat a mean of its squared command over some seconds, its change the command less the mean over them."""
 SIGNAL_WORDS = {
     "v": "speed v", "w": "turn rate w", "heading": "heading", "x": "position x", "y": "position y",
     "time": "session time", "push right": "push of the right wheel", "push left": "push of the left wheel",
-    "own speed": "speed of that wheel", "own push": "push of that wheel", "since reversal": "time since a reversal",
+    "own speed": "speed of that wheel", "own push": "push of that wheel",
+    **{name: "time since a reversal" + (f" of the mean over {tau:g} s" if tau else "")
+       for name, tau in REVERSALS.items()},
     **{name: f"mean square of that wheel's command over {tau:g} s" for name, tau in HEATS.items()},
     **{name: f"change of that wheel's command over {tau:g} s" for name, tau in CHANGES.items()},
     ANGLE: "angle of that wheel",
@@ -56,8 +61,9 @@ OF_CAMERA = ("heading", "x", "y")
 """Signals that a camera's error may depend on."""
 TIMES = {"1": "", "v": "m/s", "w": "rad/s", "cos heading": "", "sin heading": "", "own push": UNIT,
          "own speed": UNIT, "v cos heading": "m/s", "v sin heading": "m/s",
-         **dict.fromkeys(CHANGES, UNIT)}  # fmt: skip
-"""What a curve may be multiplied with, and the unit."""
+         **dict.fromkeys(CHANGES, UNIT), **dict.fromkeys(DIRECTIONS, "")}  # fmt: skip
+"""What a curve may be multiplied with, and the unit. direction: 1 forward, -1 backward, as the commands' sum or its
+mean over some seconds says."""
 
 
 def value_name(law: int, knot: int) -> str:
@@ -67,8 +73,15 @@ def value_name(law: int, knot: int) -> str:
 
 
 def remembered(past: Past, axis: int = 0) -> dict[str, Any]:
-    """What the commands of each wheel left behind, by signal. axis: of heat and change, that of the time constants."""
-    return dict(zip(MEMORIES, (row for part in past[1:] for row in jnp.moveaxis(part, axis, 0)), strict=True))
+    """What the commands of each wheel left behind, by signal. axis: that of the time constants."""
+    each = (row for part in (past.heat, past.change) for row in jnp.moveaxis(part, axis, 0))
+    return dict(zip(MEMORIES, each, strict=True))
+
+
+def which_way(past: Past, axis: int = 0) -> dict[str, Any]:
+    """Directions and times since they changed, by name. axis: that of the time constants, before that of these two."""
+    direction, since = jnp.moveaxis(past.way, (axis + 1, axis), (0, 1))
+    return dict(zip(DIRECTIONS, direction, strict=True)) | dict(zip(REVERSALS, since, strict=True))
 
 
 def knots_by_signal(law: Discovered) -> dict[str, np.ndarray]:

@@ -14,7 +14,7 @@ from jaxident.diagnosis.detectability import Replay
 from jaxident.diagnosis.diagnose import Diagnosis
 from jaxident.diagnosis.preparation.prepare import Prepared
 from jaxident.effects.catalogue import CATALOGUE
-from jaxident.effects.law_kinds import MEMORIES, TURNING, knots_by_signal
+from jaxident.effects.law_kinds import MEMORIES, REVERSALS, TURNING, knots_by_signal
 
 SCHEMA = "jaxident.diagnosis/2"
 
@@ -89,7 +89,7 @@ def law_to_dict(shown: Shown) -> dict[str, Any]:
         "acts_on": law.acts_on,
         "times": law.times,
         "inputs": [*knots_by_signal(law), *([] if law.times == "1" else [law.times])],
-        "memory": MEMORIES.get(law.signal, MEMORIES.get(law.times)),
+        "memory": (MEMORIES | REVERSALS).get(law.signal, MEMORIES.get(law.times)) or None,
         **{key: getattr(law, key) for key in TURNING},
         "curve": [dict(zip(keys, point, strict=True)) for point in points],
         "rows": list(shown.density),

@@ -9,7 +9,7 @@ from jaxident.diagnosis.account.discovered import Shown
 from jaxident.diagnosis.diagnose import Diagnosis
 from jaxident.diagnosis.discovery.forms import PATCH, beyond
 from jaxident.diagnosis.laws.kinds import Kind
-from jaxident.effects.law_kinds import ANGLE, CHANGES, SIGNAL_WORDS
+from jaxident.effects.law_kinds import ANGLE, CHANGES, DIRECTIONS, SIGNAL_WORDS
 from jaxident.report.page import Figure, Section, Table
 from jaxident.report.words import number, percent, plain, together
 
@@ -19,6 +19,7 @@ TIMES_WORDS = {
     "cos heading": "the heading's cosine times ", "sin heading": "the heading's sine times ",
     "v cos heading": "speed along x times ", "v sin heading": "speed along y times ",
     **{name: f"change of that wheel's command over {tau:g} s times " for name, tau in CHANGES.items()},
+    **dict.fromkeys(DIRECTIONS, "direction times "),
 }  # fmt: skip
 SEEN = (
     "These laws are in no catalogue. They were found on the runs that fit, and runs that took no part in that confirm "

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from jaxident.effects.past import CHANGE_TIMES, HEAT_TIMES, LONGEST, past_of, past_of_run
+from jaxident.effects.past import CHANGE_TIMES, HEAT_TIMES, LONGEST, REVERSAL_TIMES, past_of, past_of_run
 
 
 def drive(rows: int):
@@ -16,16 +16,22 @@ def drive(rows: int):
     return t, np.repeat(held, 7, axis=0)[:rows]
 
 
-def slow_since(t, command):
-    """By looking back from each row for the last change of direction."""
+def slow_way(t, command, tau):
+    """Direction and time since it changed, by looking back from each row for the last change of sign of a mean."""
     step = np.diff(t, append=2.0 * t[-1] - t[-2])
-    sums = command.sum(axis=1)
+    sums, mean = command.sum(axis=1), 0.0
+    if tau:
+        means = []
+        for h, u in zip(step, sums, strict=True):
+            mean = u + (mean - u) * np.exp(-h / tau)
+            means.append(mean)
+        sums = np.array(means)
     found = []
     for k in range(len(t)):
         signs = [(j, np.sign(sums[j])) for j in range(k + 1) if sums[j] != 0.0]
         turns = [j for (_, before), (j, now) in itertools.pairwise(signs) if now != before]
         since = t[k] - t[turns[-1]] if turns else LONGEST
-        found.append(min(since + 0.5 * step[k], LONGEST))
+        found.append((signs[-1][1] if signs else 0.0, min(since + 0.5 * step[k], LONGEST)))
     return np.array(found)
 
 
@@ -41,10 +47,13 @@ def slow_heat(t, command, tau, parts=400):
     return np.array(found)
 
 
-def test_the_time_since_a_reversal_is_that_of_a_search_backwards():
+@pytest.mark.parametrize("number", range(len(REVERSAL_TIMES)))
+def test_direction_and_time_since_it_changed_are_those_of_a_search_backwards(number):
     t, command = drive(200)
-    np.testing.assert_allclose(past_of(t, command).since, slow_since(t, command), atol=1e-12)
-    assert past_of(t, command).since.min() < 0.1
+    found, expected = past_of(t, command).way[:, number], slow_way(t, command, REVERSAL_TIMES[number])
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+    assert found[:, 1].min() < 0.1
+    assert set(np.unique(found[:, 0])) >= {-1.0, 1.0}
 
 
 @pytest.mark.parametrize("number", range(len(HEAT_TIMES)))
@@ -79,9 +88,9 @@ def test_changes_follow_their_equation(number):
 def test_runs_that_are_filled_up_have_the_same_past(rows):
     t, command = drive(rows)
     whole, plain = past_of_run(t, command), past_of(t, command)
-    assert len(whole.since) == rows
+    assert len(whole.way) == rows
     # the last row's step is not known; the plain one guesses it
-    np.testing.assert_allclose(whole.since[:-1], plain.since[:-1], atol=1e-12)
+    np.testing.assert_allclose(whole.way[:-1], plain.way[:-1], atol=1e-12)
     np.testing.assert_allclose(whole.heat[:-1], plain.heat[:-1], atol=1e-12)
     np.testing.assert_allclose(whole.change[:-1], plain.change[:-1], atol=1e-12)
 
@@ -91,6 +100,6 @@ def test_runs_side_by_side_are_those_alone():
     both = past_of(np.stack([t, t], axis=1), np.stack([one, other[:60]], axis=1))
     for k, command in enumerate((one, other[:60])):
         alone = past_of(t, command)
-        np.testing.assert_allclose(both.since[:, k], alone.since)
+        np.testing.assert_allclose(both.way[..., k], alone.way)
         np.testing.assert_allclose(both.heat[..., k], alone.heat)
         np.testing.assert_allclose(both.change[..., k], alone.change)

@@ -7,7 +7,7 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.laws.kinds import Kind, at_knots, nominal_part
-from jaxident.effects.law_kinds import ANGLE, knots_by_signal
+from jaxident.effects.law_kinds import ANGLE, REVERSALS, knots_by_signal
 from jaxident.robot.model import Discovered
 
 LIKE = 0.8
@@ -42,7 +42,7 @@ BENT: Forms = {
     "c exp(-s / s0)": lambda s, s0: np.exp(-s / s0),
 }
 """Forms that begin at some s0."""
-ONLY_OF = {**dict.fromkeys(ROUND, ("heading", ANGLE)), "c exp(-s / s0)": ("since reversal",)}
+ONLY_OF = {**dict.fromkeys(ROUND, ("heading", ANGLE)), "c exp(-s / s0)": tuple(REVERSALS)}
 """Forms of some signals alone."""
 PRODUCTS: Forms = {
     "c s t": lambda s, t: s * t,

@@ -32,6 +32,7 @@ from jaxident.effects.law_kinds import (
     TURN,
     WHEELS,
     remembered,
+    which_way,
 )
 from jaxident.estimation.poses.ways import way_and_turn
 
@@ -98,9 +99,9 @@ def path_of(fit: Solution, windows: Windows, laws: Laws | None = None) -> Path:
     heading = (theta + np.pi) % (2.0 * np.pi) - np.pi
     signals = {"1": np.ones_like(v), "v": v, "w": w, "heading": heading, "x": x, "y": y, "time": time,
                "push right": push[..., 0], "push left": push[..., 1],
-               "since reversal": np.asarray(past.since).T, "cos heading": np.cos(theta),
-               "sin heading": np.sin(theta), "v cos heading": v * np.cos(theta),
+               "cos heading": np.cos(theta), "sin heading": np.sin(theta), "v cos heading": v * np.cos(theta),
                "v sin heading": v * np.sin(theta)}  # fmt: skip
+    signals |= {name: np.asarray(part).T for name, part in which_way(past, axis=1).items()}
     own = {"1": np.ones_like(push), "own speed": speeds, "own push": push}
     own |= {name: np.asarray(part).transpose(2, 0, 1) for name, part in remembered(past, axis=1).items()}
     seen = np.repeat(np.asarray(windows.seen).T, 3, axis=1)

@@ -11,10 +11,12 @@ from jaxident.effects.law_kinds import (
     ANGLE,
     BY_CAMERA,
     CHANGES,
+    DIRECTIONS,
     HEADING,
     HEATS,
     LEFT,
     PUSHES,
+    REVERSALS,
     ROLLINGS,
     SIDEWAYS,
     TURN,
@@ -26,8 +28,8 @@ ELSEWHERE = ("heading", "x", "y", "time", "since reversal")
 """Of what is no speed."""
 SITE_OF_SIGNAL = {
     "v": "drive", "w": "drive", "heading": "contact", "x": "contact", "y": "contact", "time": "time",
-    "push right": "actuation", "push left": "actuation", "since reversal": "contact", "own speed": "drive",
-    "own push": "actuation", ANGLE: "drive", **dict.fromkeys([*HEATS, *CHANGES], "actuation"),
+    "push right": "actuation", "push left": "actuation", **dict.fromkeys(REVERSALS, "contact"),
+    "own speed": "drive", "own push": "actuation", ANGLE: "drive", **dict.fromkeys([*HEATS, *CHANGES], "actuation"),
 }  # fmt: skip
 """The site of a law that acts on accelerations or pushes, by its signal; where a command's change is multiplied with a
 curve, by the change."""
@@ -71,6 +73,8 @@ KINDS = (
     *(Kind(act, "1", signal) for act in (ALONG, HEADING) for signal in OF_FORCE),
     *(Kind(act, "v", signal) for act in (ALONG, HEADING) for signal in ("w", *ELSEWHERE)),
     *(Kind(act, "w", signal) for act in (ALONG, HEADING) for signal in ("v", *ELSEWHERE)),
+    *(Kind(act, *pair) for act in (ALONG, HEADING) for pair in zip(DIRECTIONS, REVERSALS, strict=True)),
+    *(Kind(act, "v", since) for act in (ALONG, HEADING) for since in [*REVERSALS][1:]),
     *(Kind(SIDEWAYS, "v", signal) for signal in ("w", "heading", "x", "y", "time")),
     *(Kind(SIDEWAYS, "1", signal) for signal in ("w", "heading")),
     *(Kind(WHEELS, "1", signal) for signal in ("own speed", "own push")),

@@ -57,9 +57,8 @@ def rolled(vector: Array, starts: Array, push: Push, windows: Windows, laws: Law
 def left_behind(windows: Windows) -> Past:
     """What the commands left behind at each row of the windows (rows, ..., windows)."""
     places = jnp.minimum(windows.first + jnp.arange(len(windows.step))[:, None], len(windows.t) - 1)
-    since, *by_wheel = past_of(windows.t, windows.command)
-    own = (jnp.moveaxis(part, -1, 1)[places, windows.run].transpose(0, 2, 3, 1) for part in by_wheel)
-    return Past(since[places, windows.run], *own)
+    past = past_of(windows.t, windows.command)
+    return Past(*(jnp.moveaxis(part, -1, 1)[places, windows.run].transpose(0, 2, 3, 1) for part in past))
 
 
 def _moved(vector: Array, starts: Array, push: Push, windows: Windows, laws: Laws | None) -> tuple[State, list]:

@@ -35,7 +35,7 @@ class Stretch(NamedTuple):
     past: Past
 
 
-AXES = Stretch(1, 0, 1, 1, 1, 0, 1, 0, Past(1, 3, 3))
+AXES = Stretch(1, 0, 1, 1, 1, 0, 1, 0, Past(3, 3, 3))
 """The axis of each part of a `Stretch` along which stretches lie side by side."""
 
 
@@ -90,9 +90,9 @@ def _of_run(run: Log, starts: Array, lead: int, before: int, horizon: int, sessi
     seen = np.isfinite(pose).all(axis=-1) & (rows >= 0) & (rows <= starts) & (rows >= starts - before)
     pose = np.where(seen[..., None], pose, 0.0)
     begin = np.maximum(lead + before - starts, 0)
-    since, *by_wheel = past_of_run(np.asarray(run.t), sent) if past else NO_PAST
+    whole = past_of_run(np.asarray(run.t), sent) if past else NO_PAST
     kept = inside if past else inside[:0]
-    left = Past(since[kept], *(np.moveaxis(part[kept], 1, -1) for part in by_wheel))
+    left = Past(*(np.moveaxis(part[kept], 1, -1) for part in whole))
     found = Stretch(t - t[0], session + t[0] - run.t[0], command, pose, seen, np.argmax(seen, axis=0), None, begin,
                     left)  # fmt: skip
     return found._replace(speeds=_guess(found))
