@@ -50,7 +50,7 @@ SIGNAL_WORDS = {
     "v": "speed v", "w": "turn rate w", "heading": "heading", "x": "position x", "y": "position y",
     "time": "session time", "push right": "push of the right wheel", "push left": "push of the left wheel",
     "own speed": "speed of that wheel", "own push": "push of that wheel",
-    **{name: "time since a reversal" + (f" of the mean over {tau:g} s" if tau else "")
+    **{name: "time since " + (f"the commands' mean over {tau:g} s turned round" if tau else "a reversal")
        for name, tau in REVERSALS.items()},
     **{name: f"mean square of that wheel's command over {tau:g} s" for name, tau in HEATS.items()},
     **{name: f"change of that wheel's command over {tau:g} s" for name, tau in CHANGES.items()},
