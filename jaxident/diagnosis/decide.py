@@ -9,7 +9,7 @@ from jaxident.diagnosis.posterior import Judgement
 from jaxident.diagnosis.preparation import translate
 from jaxident.diagnosis.preparation.prepare import Prepared
 from jaxident.effects.coordinates import ASIDE, PLACES
-from jaxident.effects.law_kinds import ANGLE
+from jaxident.effects.law_kinds import ANGLE, REVERSALS, SIGNAL_WORDS
 
 VERDICTS = ("no_gap", "parameters", "effects", "partly", "unknown", "undecided")
 """What a diagnosis may come to; studies store its place here."""
@@ -83,7 +83,9 @@ def advice(verdict: str, judgement: Judgement, laws: tuple[Shown, ...], whole: b
         begin = "Ask what on the robot could make the discovered curve."
         if signal == ANGLE:
             return f"{begin} Look at what turns with that wheel: its rim, its axle, gears, the motor."
-        return f"{begin} Runs in which its signal ({signal}) varies more would tell it better."
+        if signal in REVERSALS:
+            return f"{begin} Look at its castors. Runs that often go from forward to backward would tell it better."
+        return f"{begin} Runs in which the {SIGNAL_WORDS[signal]} varies more would tell it better."
     if verdict in ("unknown", "partly"):
         return "No effect of the catalogue explains what is left: record runs that stay in the regions where it lies."
     longer = "; a longer log would find fainter effects" if whole else ""

@@ -34,8 +34,8 @@ from jaxident.effects.law_kinds import (
     SIGNALS,
     TIMES,
     WHEELS,
+    directions,
     remembered,
-    which_way,
 )
 from jaxident.effects.signals import Motion
 from jaxident.numerics import sin_cos, wrap
@@ -144,7 +144,7 @@ def _shared(now: Motion, here: Here) -> dict[str, Array]:
     return {"1": jnp.ones_like(now.v), "v": now.v, "w": now.w, "cos heading": cosine, "sin heading": sine,
             "v cos heading": now.v * cosine, "v sin heading": now.v * sine,
             "heading": wrap(now.theta), "x": here.x, "y": here.y, "time": here.time,
-            "push right": right, "push left": left, **which_way(here.past)}  # fmt: skip
+            "push right": right, "push left": left, **directions(here.past)}  # fmt: skip
 
 
 def _added(laws: Laws, known: Mapping[str, Array]) -> Array:

@@ -78,9 +78,9 @@ def remembered(past: Past, axis: int = 0) -> dict[str, Any]:
     return dict(zip(MEMORIES, each, strict=True))
 
 
-def which_way(past: Past, axis: int = 0) -> dict[str, Any]:
+def directions(past: Past, axis: int = 0) -> dict[str, Any]:
     """Directions and times since they changed, by name. axis: that of the time constants, before that of these two."""
-    direction, since = jnp.moveaxis(past.way, (axis + 1, axis), (0, 1))
+    direction, since = jnp.moveaxis(past.reversal, (axis + 1, axis), (0, 1))
     return dict(zip(DIRECTIONS, direction, strict=True)) | dict(zip(REVERSALS, since, strict=True))
 
 

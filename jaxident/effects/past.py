@@ -27,8 +27,6 @@ CHANGE_TIMES = (0.03, 0.1, 0.3)
 """Time constants tau [s]. Of 0.03, 0.06, 0.12 and 0.25 s the shortest brought most on three simulated robots whose
 delay grows with the speed: on one of them 5620, 5320, 4300 and 2900 in log evidence. Half a log of a Create asked for
 0.1 s, by 32. No longer ones than 0.3 s were tried."""
-TINY = 1e-9
-"""Time [s] that no time constant is below, so that nothing is divided by 0."""
 LONGEST = 2.0
 """Time since a reversal [s] beyond which it does not matter how long ago that was, and from which a run starts. No
 other value was tried."""
@@ -38,12 +36,12 @@ tried."""
 
 
 class Past(NamedTuple):
-    """way (times, 2, ...): by each of REVERSAL_TIMES the direction, -1, 1, or 0 before a first command, and the time
-    since it last changed [s], at most LONGEST; heat (times, 2, ...) [unit^2]: of the right and the left motor by each
-    of HEAT_TIMES. Times and heats are those of the middle of a row. change (times, 2, ...) [unit]: of both commands by
-    each of CHANGE_TIMES, the mean over a row."""
+    """reversal (times, 2, ...): by each of REVERSAL_TIMES the direction, -1, 1, or 0 before a first command, and the
+    time since it last changed [s], at most LONGEST; heat (times, 2, ...) [unit^2]: of the right and the left motor by
+    each of HEAT_TIMES. Times and heats are those of the middle of a row. change (times, 2, ...) [unit]: of both
+    commands by each of CHANGE_TIMES, the mean over a row."""
 
-    way: Any
+    reversal: Any
     heat: Any
     change: Any
 
@@ -53,19 +51,19 @@ def past_of(t: Array, command: Array) -> Past:
     step = jnp.diff(t, axis=0, append=2.0 * t[-1:] - t[-2:-1])
     sent = jnp.moveaxis(command, -1, 1)
     taus, own_taus = (jnp.reshape(jnp.array(times), (-1, *[1] * sent[0].ndim)) for times in (HEAT_TIMES, CHANGE_TIMES))
-    way_taus = jnp.reshape(jnp.array(REVERSAL_TIMES), (-1, *[1] * step[0].ndim))
+    mean_taus = jnp.reshape(jnp.array(REVERSAL_TIMES), (-1, *[1] * step[0].ndim))
 
     def body(carry, row):
         smooth, direction, since, heat, mean = carry
         u, h = row
-        kept = jnp.where(way_taus > 0.0, jnp.exp(-h / jnp.maximum(way_taus, TINY)), 0.0)
+        kept = jnp.where(mean_taus > 0.0, jnp.exp(-h / jnp.where(mean_taus > 0.0, mean_taus, 1.0)), 0.0)
         smooth = kept * smooth + (1.0 - kept) * (u[0] + u[1])
         since = jnp.where(smooth * direction < 0.0, 0.0, since)
         direction = jnp.where(smooth == 0.0, direction, jnp.sign(smooth))
         midway, after = (heat + (u**2 - heat) * -jnp.expm1(-part * h / taus) for part in (0.5, 1.0))
         nearer = -jnp.expm1(-h / own_taus)
-        way = jnp.stack([direction, jnp.minimum(since + 0.5 * h, LONGEST)], axis=1)
-        past = Past(way, midway, (u - mean) * nearer * own_taus / h)
+        reversal = jnp.stack([direction, jnp.minimum(since + 0.5 * h, LONGEST)], axis=1)
+        past = Past(reversal, midway, (u - mean) * nearer * own_taus / h)
         return (smooth, direction, jnp.minimum(since + h, LONGEST), after, mean + (u - mean) * nearer), past
 
     still = jnp.zeros((len(REVERSAL_TIMES), *t[0].shape))

@@ -16,7 +16,7 @@ def drive(rows: int):
     return t, np.repeat(held, 7, axis=0)[:rows]
 
 
-def slow_way(t, command, tau):
+def slow_reversal(t, command, tau):
     """Direction and time since it changed, by looking back from each row for the last change of sign of a mean."""
     step = np.diff(t, append=2.0 * t[-1] - t[-2])
     sums, mean = command.sum(axis=1), 0.0
@@ -50,7 +50,7 @@ def slow_heat(t, command, tau, parts=400):
 @pytest.mark.parametrize("number", range(len(REVERSAL_TIMES)))
 def test_direction_and_time_since_it_changed_are_those_of_a_search_backwards(number):
     t, command = drive(200)
-    found, expected = past_of(t, command).way[:, number], slow_way(t, command, REVERSAL_TIMES[number])
+    found, expected = past_of(t, command).reversal[:, number], slow_reversal(t, command, REVERSAL_TIMES[number])
     np.testing.assert_allclose(found, expected, atol=1e-12)
     assert found[:, 1].min() < 0.1
     assert set(np.unique(found[:, 0])) >= {-1.0, 1.0}
@@ -88,9 +88,9 @@ def test_changes_follow_their_equation(number):
 def test_runs_that_are_filled_up_have_the_same_past(rows):
     t, command = drive(rows)
     whole, plain = past_of_run(t, command), past_of(t, command)
-    assert len(whole.way) == rows
+    assert len(whole.reversal) == rows
     # the last row's step is not known; the plain one guesses it
-    np.testing.assert_allclose(whole.way[:-1], plain.way[:-1], atol=1e-12)
+    np.testing.assert_allclose(whole.reversal[:-1], plain.reversal[:-1], atol=1e-12)
     np.testing.assert_allclose(whole.heat[:-1], plain.heat[:-1], atol=1e-12)
     np.testing.assert_allclose(whole.change[:-1], plain.change[:-1], atol=1e-12)
 
@@ -100,6 +100,6 @@ def test_runs_side_by_side_are_those_alone():
     both = past_of(np.stack([t, t], axis=1), np.stack([one, other[:60]], axis=1))
     for k, command in enumerate((one, other[:60])):
         alone = past_of(t, command)
-        np.testing.assert_allclose(both.way[..., k], alone.way)
+        np.testing.assert_allclose(both.reversal[..., k], alone.reversal)
         np.testing.assert_allclose(both.heat[..., k], alone.heat)
         np.testing.assert_allclose(both.change[..., k], alone.change)

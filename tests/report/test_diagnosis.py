@@ -17,7 +17,7 @@ from jaxident.diagnosis.laws.kinds import Kind
 from jaxident.diagnosis.smallest_effects import smallest_sizes
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.coordinates import COORDINATES
-from jaxident.files.diagnosis import diagnosis_to_dict
+from jaxident.files.diagnosis import diagnosis_to_dict, law_to_dict
 from jaxident.report import Figure, Table, render
 from jaxident.report.account import account_lines, places_line
 from jaxident.report.causes import BESIDE
@@ -323,6 +323,17 @@ def test_a_law_of_a_wheel_is_told_with_how_far_it_rolls_from_turn_to_turn():
     blocks = section(page, "What was discovered").blocks
     assert any(isinstance(block, str) and "No camera sees" in block for block in blocks)
     assert "what turns with that wheel" in advice("unknown", made_up("unknown")[1], (shown,), whole=True)
+
+
+def test_a_law_of_the_time_since_a_robot_turned_round_is_told_in_words():
+    since = "since reversal 0.3 s"
+    law = Discovered("acceleration in heading", "direction 0.3 s", since, np.arange(3.0), np.ones(3), 0.1 * np.ones(3))
+    shown = Shown(Kind("acceleration in heading", "direction 0.3 s", since), law, (9,) * 3, 0.9, 0.01, None)
+    page = diagnosis_page(made_up("unknown")._replace(discovered=(shown,)), "runs")
+    told = "direction times a curve of the time since the commands' mean over 0.3 s turned round"
+    assert f"to the acceleration in heading comes {told}" in page.lead
+    assert "Look at its castors" in advice("unknown", made_up("unknown")[1], (shown,), whole=True)
+    assert law_to_dict(shown)["memory"] == 0.3
 
 
 def test_laws_that_explain_nearly_as_much_are_named():

@@ -31,8 +31,8 @@ from jaxident.effects.law_kinds import (
     SIDEWAYS,
     TURN,
     WHEELS,
+    directions,
     remembered,
-    which_way,
 )
 from jaxident.estimation.poses.ways import way_and_turn
 
@@ -101,7 +101,7 @@ def path_of(fit: Solution, windows: Windows, laws: Laws | None = None) -> Path:
                "push right": push[..., 0], "push left": push[..., 1],
                "cos heading": np.cos(theta), "sin heading": np.sin(theta), "v cos heading": v * np.cos(theta),
                "v sin heading": v * np.sin(theta)}  # fmt: skip
-    signals |= {name: np.asarray(part).T for name, part in which_way(past, axis=1).items()}
+    signals |= {name: np.asarray(part).T for name, part in directions(past, axis=1).items()}
     own = {"1": np.ones_like(push), "own speed": speeds, "own push": push}
     own |= {name: np.asarray(part).transpose(2, 0, 1) for name, part in remembered(past, axis=1).items()}
     seen = np.repeat(np.asarray(windows.seen).T, 3, axis=1)

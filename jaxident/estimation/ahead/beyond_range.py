@@ -3,7 +3,7 @@
 import numpy as np
 
 from jaxident.array_types import Array, Wheels
-from jaxident.effects.law_kinds import ANGLE, SIGNALS, knots_by_signal, remembered, which_way
+from jaxident.effects.law_kinds import ANGLE, SIGNALS, directions, knots_by_signal, remembered
 from jaxident.estimation.ahead.stretches import Starts, cut_stretches
 from jaxident.log import Log
 from jaxident.numerics import wrap
@@ -60,7 +60,7 @@ def signals(model: Model, log: Log, starts: Starts, pose: Array, session_time: f
     return {
         "v": v, "w": w, "heading": np.asarray(wrap(theta)), "x": x, "y": y,
         "time": stretch.session + t + 0.0 * x, "push right": push[0], "push left": push[1],
-        **{name: np.asarray(part[1:]) + 0.0 * x for name, part in which_way(stretch.past, axis=1).items()},
+        **{name: np.asarray(part[1:]) + 0.0 * x for name, part in directions(stretch.past, axis=1).items()},
         "own speed": np.concatenate(speeds), "own push": np.concatenate(push),
         **{name: np.concatenate(part + 0.0 * x) for name, part in past.items()},
     }  # fmt: skip
