@@ -69,7 +69,8 @@ def in_words(kind: Kind, turning: Turning) -> str:
 def turnings(data: Data, fit: Solution, base: Array, path: Path, responses: Responses) -> Found:
     """For each wheel and each kind of law that goes by its angle the pattern that the poses ask for most; base
     (windows, numbers, n): whitened columns of a fit free of start states, the residual last."""
-    sought: list[tuple[list[Kind], float, float]] = []
+    sought: list[tuple[list[Kind], _Seen, float, float]] = []
+    residual = _left(base)
     if not (np.isfinite(path.way).all() and np.isfinite(path.turn).all()):
         return []
     for number, (push, roll) in enumerate(zip(PUSHES, ROLLINGS, strict=True)):
@@ -78,12 +79,11 @@ def turnings(data: Data, fit: Solution, base: Array, path: Path, responses: Resp
             continue  # a wheel that does nothing, of a robot that coasts
         half, side = abs(float(along / heading)), float(np.sign(along * heading))
         kinds = [Kind(push, "1", ANGLE), Kind(push, "own push", ANGLE), Kind(roll, "own speed", ANGLE)]
-        sought.append((kinds, half, side))
-    residual = _left(base)
+        # not side by side: what threads gave back of such arrays stayed with the process, 100 MB for each search
+        sought.append((kinds, _seen(data, fit, residual, path, responses, kinds), half, side))
 
-    def strongest(kinds: list[Kind], half: float, side: float) -> Found:
-        found = _strongest(_seen(data, fit, residual, path, responses, kinds), path, half, side)
-        return list(zip(kinds, found, strict=True))
+    def strongest(kinds: list[Kind], seen: _Seen, half: float, side: float) -> Found:
+        return list(zip(kinds, _strongest(seen, path, half, side), strict=True))
 
     return [pair for found in in_parallel(strongest, sought) for pair in found]
 
@@ -125,7 +125,8 @@ def _strongest(seen: _Seen, path: Path, half: float, side: float) -> list[Turnin
     a_row = max(float(np.mean(np.abs(np.diff(seen.way + side * half * seen.turn, axis=1)))), 1e-9)
     k_all = np.arange(SLOWEST * float(np.median(path.step)) / a_row, FASTEST / a_row, k_step)
     q_all = np.arange(PLACES[0] * k_all[0] * half, PLACES[1] * k_all[-1] * half + q_step, q_step)
-    waves = _waves(seen.turn, side * q_all) * _waves(seen.turned, side * q_all)[:, None]
+    waves = _waves(seen.turn, side * q_all)
+    waves *= _waves(seen.turned, side * q_all)[:, None]
     finer = _waves(seen.gone, more_k), _waves(seen.turned, side * more_q)
     best, count = [(-1.0, 0.0, 0.0)] * len(seen.asked), 0
     for k in k_all:
@@ -156,9 +157,12 @@ def _steps(seen: _Seen, since: Array, begun: Array) -> tuple[float, np.ndarray]:
 
 def _waves(way: Array, rate: Array) -> np.ndarray:
     """exp(i rate way) (..., rates). Sines of single precision take an eighth of the time; at 10,000 rad they are off by
-    0.001."""
-    angle = (way[..., None] * rate).astype(np.float32)
-    return np.cos(angle) + np.complex64(1j) * np.sin(angle)
+    0.001. Filled in place: on a long log these are the largest arrays."""
+    angle = way.astype(np.float32)[..., None] * np.asarray(rate, np.float32)
+    waves = np.empty(angle.shape, np.complex64)
+    np.cos(angle, out=waves.real)
+    np.sin(angle, out=waves.imag)
+    return waves
 
 
 def _powers(seen: _Seen, k: float, waves: Array, more_k: Array, more_q: Array) -> np.ndarray:
@@ -178,10 +182,10 @@ def _powers(seen: _Seen, k: float, waves: Array, more_k: Array, more_q: Array) -
 def _closer(seen: _Seen, kind: int, k: float, q: float, k_step: float, q_step: float) -> tuple:
     """k, q and phases (windows,) of the pattern of a kind that explains most near some k and q."""
     for zoom in range(ZOOMS):
-        grid = np.meshgrid(k + 0.5**zoom * k_step * AROUND, q + 0.5**zoom * q_step * AROUND)
-        k_near, q_near = (part.ravel() for part in grid)
-        gain = _explained(seen, kind, k_near, q_near)[0]
-        k, q = k_near[gain.argmax()], q_near[gain.argmax()]
+        k_near, q_near = np.meshgrid(k + 0.5**zoom * k_step * AROUND, q + 0.5**zoom * q_step * AROUND)
+        gain = [_explained(seen, kind, *row)[0] for row in zip(k_near, q_near, strict=True)]  # all at once take memory
+        best = np.unravel_index(np.argmax(gain), k_near.shape)
+        k, q = k_near[best], q_near[best]
     phase = np.zeros(len(seen.gone))
     for own, angle in zip(seen.parts, _explained(seen, kind, np.array([k]), np.array([q]))[1][:, 0], strict=True):
         phase[own] = angle
