@@ -70,9 +70,9 @@ def turnings(data: Data, fit: Solution, base: Array, path: Path, responses: Resp
     """For each wheel and each kind of law that goes by its angle the pattern that the poses ask for most; base
     (windows, numbers, n): whitened columns of a fit free of start states, the residual last."""
     sought: list[tuple[list[Kind], _Seen, float, float]] = []
-    residual = _left(base)
     if not (np.isfinite(path.way).all() and np.isfinite(path.turn).all()):
         return []
+    residual = _left(base)
     for number, (push, roll) in enumerate(zip(PUSHES, ROLLINGS, strict=True)):
         along, heading = path.gain[:, number] / path.rates
         if along == 0.0 or heading == 0.0:
