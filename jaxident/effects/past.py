@@ -2,7 +2,6 @@
 since when, how warm each motor is, and how far each command has just changed.
 
     s' = (u_r + u_l - s) / tau, a direction, the sign of s, for each tau of REVERSAL_TIMES
-
     heat' = (u^2 - heat) / tau, one heat for each wheel and each tau of HEAT_TIMES
     change = u - mean, mean' = (u - mean) / tau, one mean for each wheel and each tau of CHANGE_TIMES
 
@@ -18,9 +17,9 @@ import numpy as np
 from jaxident.array_types import Array
 
 REVERSAL_TIMES = (0.0, 0.15, 0.3, 0.6)
-"""Time constants tau [s]. A robot goes on for a while when it is told to go the other way: a nominal one with equal
-wheels so long that its tau is one over its rate. Of 0, 0.1, 0.2, 0.3 and 0.5 s on a simulated castor 0.3 s brought
-most, 280 in log evidence, and 0 s 236; on one of an independent simulator 187, and 36."""
+"""Time constants tau [s]. A robot goes on for a while when it is told to go the other way: the speed of a nominal one
+with equal wheels is such a mean, with tau one over its rate. Of 0, 0.1, 0.2, 0.3 and 0.5 s on a simulated castor 0.3 s
+brought most, 280 in log evidence, and 0 s 236; on one of an independent simulator 187, and 36."""
 HEAT_TIMES = (1.0, 3.0, 10.0)
 """Time constants tau [s]. No others were tried."""
 CHANGE_TIMES = (0.03, 0.1, 0.3)
