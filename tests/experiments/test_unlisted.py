@@ -77,7 +77,7 @@ def test_table_and_page_tell_of_every_robot(tmp_path):
         ("patch", Kind("acceleration along", "v", "x", "y")),
         ("saddle", Kind("acceleration along", "cos heading", "x", "y")),
         ("hot", Kind("push of each wheel", "own push", "own heat 3 s")),
-        ("castor", Kind("acceleration along", "v", "since reversal")),
+        ("castor", Kind("acceleration along", "v", "since reversal 0.3 s")),
         ("coupled", Kind("acceleration in heading", "w", "v")),
         ("late", Kind("push of each wheel", "own change 0.03 s", "v")),
         ("brakes", Kind("push of each wheel", "1", "own speed", "own push")),
