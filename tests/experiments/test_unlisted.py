@@ -88,7 +88,7 @@ def test_the_law_that_is_found_first_acts_where_the_hidden_effect_does(hidden, k
     logs = as_logs(drive(robot, hidden, 1.0, RUNS, 1002))
     found = discover(find_effects(prepare(logs, None))[1])
     assert found
-    # a drag and a traction limit are named in the place of weak brakes: a law that mends the drag comes first there
+    # weak brakes are named as a drag and a traction limit; the first law mends that drag, the second is the true one
     assert found[1 if hidden == "brakes" else 0].curves[-1].kind == kind
     if hidden == "patch":
         law = as_law(found[0].curves[0])
