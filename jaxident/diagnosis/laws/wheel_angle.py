@@ -67,10 +67,10 @@ def in_words(kind: Kind, turning: Turning) -> str:
 
 
 def turnings(data: Data, fit: Solution, base: Array, path: Path, responses: Responses) -> Found:
-    """For each wheel and each kind of law that goes by its angle the pattern that the poses ask for most; base
-    (windows, numbers, n): whitened columns of a fit free of start states, the residual last."""
+    """For each wheel and each kind of law that goes by its angle the pattern that the poses ask for most, none where a
+    robot runs away; base (windows, numbers, n): whitened columns of a fit free of start states, the residual last."""
     sought: list[tuple[list[Kind], _Seen, float, float]] = []
-    if not (np.isfinite(path.way).all() and np.isfinite(path.turn).all()):
+    if not all(np.isfinite(part).all() for part in (path.way, path.turn, base)):
         return []
     residual = _left(base)
     for number, (push, roll) in enumerate(zip(PUSHES, ROLLINGS, strict=True)):

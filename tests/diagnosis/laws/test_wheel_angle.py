@@ -149,6 +149,10 @@ def test_a_wheel_that_does_nothing_is_left_out():
     assert [kind.acts_on for kind, _ in found] == ["push of the left wheel"] * 2 + ["rolling of the left wheel"]
     assert all(np.isfinite([turning.period, turning.half_track]).all() for _, turning in found)
     assert all(turning.half_track < 0.0 for _, turning in found)
+    away = base.copy()
+    away[3, 2, 1] = np.inf
+    fit = Solution(None, None, [], linear, 0.0, None, 0)
+    assert turnings(data, fit, away, whole, Responses(answer, answer, None)) == []
 
 
 def test_a_long_run_is_searched_in_parts():
