@@ -19,6 +19,7 @@ from jaxident.diagnosis.causes.finding import CLAIMED, Finding, find_effects
 from jaxident.diagnosis.decide import Parameter, advice, compare_parameters, decide
 from jaxident.diagnosis.detectability import Replay, answers, replay, visible
 from jaxident.diagnosis.fit.prior import held_rates
+from jaxident.diagnosis.laws.not_shown import NotShown, not_shown
 from jaxident.diagnosis.posterior import Judgement, judge
 from jaxident.diagnosis.preparation.prepare import Prepared, prepare, suspected_wheels
 from jaxident.diagnosis.preparation.translate import to_model
@@ -68,6 +69,7 @@ class Diagnosis(NamedTuple):
         needless: effects that were named before the laws were discovered, and in whose place these stand. The corrected
             model has none of them, either.
         odometry: the judging stretches as the wheels tell them; None without wheel speeds.
+        not_shown: why some laws were not looked for.
     """
 
     verdict: str
@@ -92,6 +94,7 @@ class Diagnosis(NamedTuple):
     refused: tuple[str, ...] = ()
     needless: tuple[str, ...] = ()
     odometry: Odometry | None = None
+    not_shown: NotShown = NotShown()
 
     @property
     def not_testable(self) -> list[str]:
@@ -158,7 +161,8 @@ def diagnose(
     return Diagnosis(verdict, judgement, gap, account, where, selected, parameters, visible(known), replay(known, seed),
                      advice(verdict, judgement, laws, prepared.whole), nominal, corrected, shrinks, prepared, finding,
                      surplus, simulator, laws, suspicions_of(join(logs), prepared),
-                     refused, needless, odometry(prepared, gap.paths, corrected))  # fmt: skip
+                     refused, needless, odometry(prepared, gap.paths, corrected),
+                     not_shown(finding.fit, finding.data.windows))  # fmt: skip
 
 
 class Seen(NamedTuple):

@@ -12,6 +12,7 @@ from jaxident.diagnosis.account.odometry import Odometry
 from jaxident.diagnosis.account.where import OF_COMMANDS, Region
 from jaxident.diagnosis.detectability import Replay
 from jaxident.diagnosis.diagnose import Diagnosis
+from jaxident.diagnosis.laws.not_shown import NotShown
 from jaxident.diagnosis.preparation.prepare import Prepared
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.law_kinds import MEMORIES, REVERSALS, TURNING, knots_by_signal
@@ -45,6 +46,7 @@ def diagnosis_to_dict(found: Diagnosis) -> dict[str, Any]:
         "needless": list(found.needless),
         "wheels": None if found.odometry is None else _wheels(found.odometry),
         "discovered": [law_to_dict(one) for one in found.discovered] or None,
+        "not_looked_for": _not_looked_for(found.not_shown),
         "surplus": list(found.surplus),
         "parameters": [p._asdict() for p in found.parameters],
         "not_testable": found.not_testable,
@@ -59,6 +61,12 @@ def _served(prepared: Prepared) -> dict[str, int]:
     """How many rows the log has, and how many of them fitted and judged."""
     fitted, judged = prepared.served
     return {"log": len(prepared.log.t), "fitted": fitted, "judged": judged}
+
+
+def _not_looked_for(hidden: NotShown) -> dict[str, Any]:
+    """Why some laws were not looked for."""
+    pairs = [list(pair) for pair in hidden.together]
+    return {"too_few_windows": hidden.windows, "hardly_vary": list(hidden.still), "go_together": pairs}
 
 
 def _wheels(told: Odometry) -> dict[str, Any]:

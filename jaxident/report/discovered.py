@@ -9,6 +9,7 @@ from jaxident.diagnosis.account.discovered import Shown
 from jaxident.diagnosis.diagnose import Diagnosis
 from jaxident.diagnosis.discovery.forms import PATCH, beyond
 from jaxident.diagnosis.laws.kinds import Kind
+from jaxident.diagnosis.laws.not_shown import FEWEST, NotShown
 from jaxident.effects.law_kinds import ANGLE, CHANGES, DIRECTIONS, SIGNAL_WORDS
 from jaxident.report.page import Figure, Section, Table
 from jaxident.report.words import number, percent, plain, together
@@ -38,6 +39,8 @@ OF_MAP = (
     "two standard deviations from 0; dashed: the circle that it looks like, if any. "
 )
 REST = "What the nominal model could have as well (in its rates and gains) is taken away; its doubt is not."
+NOT_SHOWN = "What these logs cannot show"
+"""The title where nothing was discovered, and some laws were not looked for."""
 HEIGHT, MAP_HEIGHT = 2.1, 4.2
 """Of the picture of a curve and of a map [in]."""
 
@@ -66,9 +69,10 @@ def _like(shown: Shown) -> str:
 
 
 def discovered(found: Diagnosis) -> list[Section]:
-    """The section on discovered laws; none where there are none."""
+    """The section on discovered laws and on those that were not looked for; none where there is nothing of that."""
+    hidden = not_looked_for(found.not_shown)
     if not found.discovered:
-        return []
+        return [Section(NOT_SHOWN, hidden)] if hidden else []
     rows = [
         (shown.law.acts_on, f"{_words(shown.kind)}{_each_turn(shown)}",
          percent(shown.share), f"{shown.p_value:.2g}", _form(shown))
@@ -77,7 +81,23 @@ def discovered(found: Diagnosis) -> list[Section]:
     table = Table(("acts on", "what is added", "share of the error", "probability by chance", "looks like"), rows)
     pictures = [_picture(shown) for shown in found.discovered]
     wheels = [OF_WHEEL] if any(shown.law.signal == ANGLE for shown in found.discovered) else []
-    return [Section("What was discovered", [SEEN, *wheels, *pictures, table, *_other_forms(found), *_alike(found)])]
+    return [Section("What was discovered", [SEEN, *wheels, *pictures, table, *_other_forms(found), *_alike(found),
+                                              *hidden])]  # fmt: skip
+
+
+def not_looked_for(hidden: NotShown) -> list[str]:
+    """Laws that were not looked for, and what would show them."""
+    if hidden.windows is not None:
+        return [f"No law beyond the catalogue was looked for. The runs that fit give {hidden.windows} stretches, and a "
+                f"curve needs {FEWEST}. Longer or more runs would do."]  # fmt: skip
+    lines = [
+        f"No law by the {SIGNAL_WORDS[name]} was looked for: in these logs it hardly varies." for name in hidden.still
+    ]
+    for pair in hidden.together:
+        one, other = (SIGNAL_WORDS[name] for name in pair)
+        lines.append(f"No law by the {one} or the {other} was looked for: in these logs each follows from the other. A "
+                     "run that tells them apart would show which of them counts.")  # fmt: skip
+    return lines
 
 
 def _picture(shown: Shown) -> Figure:

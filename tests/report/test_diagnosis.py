@@ -14,6 +14,7 @@ from jaxident.diagnosis.decide import Parameter, advice
 from jaxident.diagnosis.diagnose import COASTED
 from jaxident.diagnosis.discovery.forms import PATCH, Form
 from jaxident.diagnosis.laws.kinds import Kind
+from jaxident.diagnosis.laws.not_shown import NotShown
 from jaxident.diagnosis.smallest_effects import smallest_sizes
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.coordinates import COORDINATES
@@ -298,6 +299,18 @@ def test_discovered_laws_have_a_section_a_picture_and_a_sentence():
     assert any(isinstance(block, Figure) and block.png for block in blocks)
     assert "with discovered laws" in str(section(page, "How large the gap is").blocks)
     assert blocks[-1].endswith("this may be turn loss in another form than the catalogue's.")
+
+
+def test_laws_that_the_logs_cannot_show_are_named():
+    hidden = NotShown(still=("w",), together=(("x", "y"),))
+    plain = made_up("partly")._replace(not_shown=hidden)
+    with_law = plain._replace(discovered=(discovered_law(),))
+    few = plain._replace(not_shown=NotShown(windows=5))
+    for found, title in ((plain, "What these logs cannot show"), (with_law, "What was discovered")):
+        *_, one, other = section(diagnosis_page(found, "runs"), title).blocks
+        assert "by the turn rate w" in one
+        assert "by the position x or the position y" in other
+    assert "give 5 stretches" in str(section(diagnosis_page(few, "runs"), "What these logs cannot show").blocks)
 
 
 def test_a_map_of_the_floor_is_told_and_drawn():

@@ -26,7 +26,8 @@ from jaxident.diagnosis.discovery.fit import (
 from jaxident.diagnosis.fit.prior import with_prior
 from jaxident.diagnosis.fit.refit import Data, Solution
 from jaxident.diagnosis.laws.candidates import candidates, of_wheel, path_of
-from jaxident.diagnosis.laws.kinds import KINDS
+from jaxident.diagnosis.laws.kinds import KINDS, Kind
+from jaxident.diagnosis.laws.not_shown import not_shown
 from jaxident.diagnosis.laws.wheel_angle import turnings
 from jaxident.diagnosis.motion.linear import without_starts
 from jaxident.diagnosis.motion.responses import respond
@@ -39,8 +40,6 @@ PRICE = float(np.log(len(KINDS)))
 ALIKE = 0.9
 """Part of what the best curve brings from which on another kind is told with it. The product of both speeds, which two
 kinds hold, brought 0.98 by the other one; other kinds at most 0.42 (three simulated robots)."""
-FEWEST = 8
-"""Windows that a curve needs: two for each stretch that is left out once."""
 MOST_SETS = 3
 """Of curves that a search follows. No other number was tried."""
 
@@ -53,23 +52,25 @@ class Worthy(NamedTuple):
 
 
 def discover(finding: Finding) -> list[Bending]:
-    """Fits with one curve, two and so on; none where nothing is worth it. Poses alone judge a curve.
+    """Fits with one curve, two and so on; none where nothing is worth it. Poses alone judge a curve. Kinds that these
+    logs cannot show are not looked for (`not_shown`).
 
     Where evidence hardly tells which curve comes first, the search goes on from each of these, and the set that is
     worth most is kept: one curve may stand for two others together.
     """
     windows = finding.data.windows._replace(wheels=None, turning=None)
-    if len(windows.run) < FEWEST:
+    hidden = not_shown(finding.fit, windows)
+    if not (kinds := tuple(kind for kind in KINDS if not hidden.holds(kind))):
         return []
     begin = Bending(finding.fit, (), finding.fit.covariance, finding.law)
-    sets = [_go_on(windows, begin, first) for first in _near(windows, begin)[:MOST_SETS]]
+    sets = [_go_on(windows, begin, first, kinds) for first in _near(windows, begin, kinds)[:MOST_SETS]]
     return max(sets, key=lambda pair: pair[0])[1] if sets else []
 
 
-def _go_on(windows: Windows, begin: Bending, first: Worthy) -> tuple[float, list[Bending]]:
+def _go_on(windows: Windows, begin: Bending, first: Worthy, kinds: tuple[Kind, ...]) -> tuple[float, list[Bending]]:
     """What a first curve and the best ones beside it are worth, and fits with one of them, two and so on."""
     total, found = first.worth, [_with(windows, begin, first.curve)]
-    while len(found) < MOST_LAWS and (more := _near(windows, found[-1])):
+    while len(found) < MOST_LAWS and (more := _near(windows, found[-1], kinds)):
         total += more[0].worth
         found.append(_with(windows, found[-1], more[0].curve))
     return total, found
@@ -85,22 +86,22 @@ def _with(windows: Windows, now: Bending, curve: Curve) -> Bending:
     return Bending(*refit_with(whiten(fit, windows, law)[0], fit, curves), law)
 
 
-def _near(windows: Windows, now: Bending) -> list[Worthy]:
-    """The curves that bring most beside a fit, those within SURE of the best one, the best first."""
-    found = worthy(whiten(now.fit, windows, now.law)[0], now.fit, now.curves)
+def _near(windows: Windows, now: Bending, kinds: tuple[Kind, ...]) -> list[Worthy]:
+    """The curves of some kinds that bring most beside a fit, those within SURE of the best one, the best first."""
+    found = worthy(whiten(now.fit, windows, now.law)[0], now.fit, now.curves, kinds)
     return [each for each in found if each.worth > found[0].worth - SURE]
 
 
-def worthy(data: Data, fit: Solution, curves: tuple[Curve, ...]) -> list[Worthy]:
-    """The curves that are worth SURE beside some others, about a fit that has these, the best first. Kinds that bring
-    nearly as much as one are told with it."""
+def worthy(data: Data, fit: Solution, curves: tuple[Curve, ...], kinds: tuple[Kind, ...] = KINDS) -> list[Worthy]:
+    """The curves of some kinds that are worth SURE beside some others, about a fit that has these, the best first.
+    Kinds that bring nearly as much as one are told with it."""
     responses = respond(np.exp(fit.vector[:2]), fit.linear.residual, data.windows)
     base, prior = _base(data, fit, curves)
     found: list[Worthy] = []
     path = path_of(fit, data.windows, laws_from(curves, data.windows))
     turning = turnings(data, fit, base, path, responses)
     periodic = (of_wheel(*pair, path, responses) for pair in turning)
-    for each in itertools.chain(candidates(path, responses), periodic):
+    for each in itertools.chain(candidates(path, responses, kinds), periodic):
         if any(each.kind == curve.kind for curve in curves):
             continue
         bent = _beside(data, fit, base, prior, each.columns, prior_of(each))

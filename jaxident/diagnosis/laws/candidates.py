@@ -4,7 +4,7 @@ A curve is a sum of hats, one at each knot; a surface one of products of hats, r
 poses to these, linear about a fitted path.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
 import jax
@@ -12,7 +12,7 @@ import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.fit.refit import Solution
-from jaxident.diagnosis.laws.kinds import KINDS, Kind
+from jaxident.diagnosis.laws.kinds import Kind
 from jaxident.diagnosis.motion.linear import motion_of
 from jaxident.diagnosis.motion.paths import left_behind
 from jaxident.diagnosis.motion.responses import Responses
@@ -109,9 +109,9 @@ def path_of(fit: Solution, windows: Windows, laws: Laws | None = None) -> Path:
     return Path(signals, own, gain, rates, seen, way, turn, step)
 
 
-def candidates(path: Path, responses: Responses) -> Iterator[Candidate]:
-    """Every kind of law whose signals vary, about a path; those that go by the angle of a wheel left out."""
-    for kind in KINDS:
+def candidates(path: Path, responses: Responses, kinds: Iterable[Kind]) -> Iterator[Candidate]:
+    """Laws of some kinds about a path, if their signals vary; those that go by the angle of a wheel left out."""
+    for kind in kinds:
         if kind.signal == ANGLE:
             continue
         signals = _signals(kind, path)
