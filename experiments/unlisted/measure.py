@@ -8,6 +8,8 @@ from .robots import FRESH, KINDS, NOISE, ROWS, RUNS, SLIP, STEP, Robot, draw_rob
 
 HORIZON = round(1.0 / STEP)
 """Rows that predictions go ahead."""
+SESSION = STEP * ROWS * RUNS
+"""Session time [s] at which fresh runs begin: after those that are diagnosed."""
 
 
 def as_logs(runs: np.ndarray) -> list:
@@ -18,13 +20,14 @@ def as_logs(runs: np.ndarray) -> list:
 
 
 def ahead(model, logs: list) -> float:
-    """The mean squared error at the horizon over the camera's variances, of free runs from every horizon on."""
+    """The mean squared error at the horizon over the camera's variances, of free runs from every horizon on. The logs
+    begin one after the other, after those that are diagnosed."""
     import jaxident as ji
     from jaxident.numerics import wrap
 
     found = []
-    for log in logs:
-        run = ji.predict(model, log, HORIZON)
+    for begin, log in zip(SESSION + STEP * ROWS * np.arange(len(logs)), logs, strict=True):
+        run = ji.predict(model, log, HORIZON, session_time=begin)
         last = np.flatnonzero(run.step == HORIZON)
         row = run.start[last] + HORIZON
         apart = [
@@ -58,7 +61,7 @@ def one(job: tuple[str, int, float]) -> dict:
     seconds = time.perf_counter() - begin
 
     def fresh(kind: str) -> list:
-        return as_logs(drive(robot, kind, size, FRESH, 1000 * seed + 3, STEP * ROWS * RUNS))
+        return as_logs(drive(robot, kind, size, FRESH, 1000 * seed + 3, SESSION))
 
     told = diagnosis_to_dict(found)
     return {

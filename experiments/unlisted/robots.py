@@ -82,6 +82,11 @@ def _castor(now: Now, size: float, rng) -> Added:
     return -5.0 * size * swing * now.v, 2.0 * size * swing * np.sign(now.v)
 
 
+def _rub(now: Now, size: float, rng) -> Added:
+    """From 160 s of the session on something rubs: a drag of the speed alone."""
+    return np.where(now.time > 160.0, -2.0 * size * now.v, 0.0), 0.0
+
+
 def _bumps(now: Now, size: float, rng) -> Added:
     """Blows at random: not to be predicted."""
     hit = rng.random(now.v.shape) < 0.4 * STEP / SUBSTEPS
@@ -117,16 +122,21 @@ def _brakes(push: np.ndarray, now: Now, size: float) -> np.ndarray:
     return push * (1.0 - 0.5 * size * np.clip(-np.sign(push) * now.rim / 0.03, 0.0, 1.0))
 
 
+def _play(push: np.ndarray, now: Now, size: float) -> np.ndarray:
+    """A driver that follows its command only where this is farther off than 0.15: play between command and push."""
+    return np.clip(now.push, push - 0.15 * size, push + 0.15 * size)
+
+
 def _same(push: np.ndarray, now: Now, size: float) -> np.ndarray:
     return push
 
 
 FORCES: dict[str, Callable[[Now, float, np.random.Generator], Added]] = {
     "patch": _patch, "swirl": _swirl, "saddle": _saddle, "turning": _turning, "friction": _friction,
-    "coupled": _coupled, "castor": _castor, "bumps": _bumps,
+    "coupled": _coupled, "castor": _castor, "rub": _rub, "bumps": _bumps,
 }  # fmt: skip
 INPUTS: dict[str, Callable[[np.ndarray, Now, float], np.ndarray]] = {
-    "hot": _hot, "cogs": _cogs, "oval": _oval, "late": _late, "brakes": _brakes,
+    "hot": _hot, "cogs": _cogs, "oval": _oval, "late": _late, "brakes": _brakes, "play": _play,
 }  # fmt: skip
 KINDS = {**{name: law.__doc__ for name, law in (FORCES | INPUTS).items()}, "nothing": "The nominal robot."}
 """What may be hidden in a robot, in words."""

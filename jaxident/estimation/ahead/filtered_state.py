@@ -15,17 +15,15 @@ from jaxident.array_types import Array, State, Wheels
 from jaxident.effects.coordinates import by_effect
 from jaxident.effects.discovered import turned, with_laws
 from jaxident.effects.fast_input import SUBSTEPS, expected_pushes
-from jaxident.effects.fast_motion import Rolling, Row, advance_row, drive_of, lags_of, report, rolling
+from jaxident.effects.fast_motion import Rolling, Row, advance_row, drive_of, lags_of, rolling
 from jaxident.effects.law_arrays import Laws
+from jaxident.estimation.ahead.camera_pose import missed_by, seen_by, shown_as
 from jaxident.estimation.ahead.stretches import Stretch
-from jaxident.numerics import wrap
 from jaxident.robot.drive import force
 from jaxident.robot.noise import Noise
 
 STEPS = (1e-6, 1e-5, 1e-4, 1e-4, 1e-3)
 """Steps of the differences: heading [rad], v [m/s], w [rad/s], slip along [m/s^2] and in heading [rad/s^2]."""
-NUDGE = 1e-6
-"""Step of the differences of the camera by a pose [m], [rad]."""
 WIDE = (0.1, 0.1, 0.3, 1.0, 10.0)
 """Deviations of the state about its first guess [m, m, rad, m/s, rad/s], before its first pose is taken in."""
 LIMIT, DOUBT = 5.0, 2.0
@@ -83,15 +81,16 @@ def filter_and_run(
     if laws is not None:
         phase, sure = (jnp.broadcast_to(part, (len(part), t.shape[1])) for part in (laws.phase, laws.sure))
     begin = _Belief(none, nothing, nothing, rolling(none[0], phase, sure))
+    opening = shown_as(settings, stretch.pose[stretch.first, jnp.arange(t.shape[1])].T)
 
     def body(belief, now):
         k, row, own, pose, seen, jolt = now
         belief = belief._replace(start=jnp.where(k == stretch.begin, wide, belief.start))
-        belief = _opened(settings, wide, belief, pose, stretch.speeds, phase, k == stretch.first)
+        belief = _opened(wide, belief, opening, stretch.speeds, phase, k == stretch.first)
         guess = belief.mean
         belief, innovation = _take_in(settings, noise, belief, pose, seen & (k >= stretch.first) & (k <= before))
         belief = _turned(settings, belief, guess)
-        shown, camera = _seen_by(settings, belief.mean)
+        shown, camera = seen_by(settings, belief.mean)
         told, angles = [_between(camera, part[:3, :3]) for part in (belief.start, belief.slip)], belief.wheels.angles
         belief = _one_row_on(settings, drive, noise, belief, row, own, jolt, k >= before)
         return belief, (shown, *told, innovation, angles)
@@ -113,19 +112,13 @@ def _turned(settings, belief: _Belief, guess: Array) -> _Belief:
     return belief._replace(wheels=wheels._replace(angles=turned(settings, wheels.angles, way, turn)))
 
 
-def _opened(
-    settings, wide: Array, belief: _Belief, pose: Array, speeds: Array, phase: Array | None, here: Array
-) -> _Belief:
-    """Where the filter begins: at the robot whose reported pose is the first, hardly known; at some speeds, hardly
-    known either, or at those of the run-up, as well as it knows them; wheels that laws go by at a phase (laws, n)."""
+def _opened(wide: Array, belief: _Belief, opening: Array, speeds: Array, phase: Array | None, here: Array) -> _Belief:
+    """Where the filter begins: at the pose (3, n) that is reported first, hardly known; at some speeds, hardly known
+    either, or at those of the run-up, as well as it knows them; wheels that laws go by at a phase (laws, n)."""
     mean, start, slip, wheels = belief
-    x, y, theta = pose.T
-    for _ in range(3):  # the camera moves a pose by little that depends on it
-        shown = report(settings, x, y, theta)
-        x, y, theta = (a + b - c for a, b, c in zip((x, y, theta), pose.T, shown, strict=True))
     guessed = jnp.isfinite(speeds).all(axis=0)
     v, w = (jnp.where(guessed, guess, own) for guess, own in zip(speeds, mean[3:5], strict=True))
-    fresh = jnp.concatenate([jnp.stack([x, y, theta, v, w]), mean[5:]])
+    fresh = jnp.concatenate([opening, jnp.stack([v, w]), mean[5:]])
     kept = jnp.arange(len(mean)) >= jnp.where(guessed, 5, 3)[:, None]
     known = jnp.where((kept[:, :, None] & kept[:, None, :]).transpose(1, 2, 0), start, wide)
     wheels = wheels if phase is None else wheels._replace(angles=jnp.where(here, phase, wheels.angles))
@@ -154,9 +147,8 @@ def _take_in(settings, noise: Noise, belief: _Belief, pose: Array, seen: Array) 
     """The belief after a pose (n, 3), one coordinate after the other, and the squares of its normalised innovations."""
     mean, covariance = belief.mean, belief.start
     memory = noise.correlation_time is not None
-    shown, camera = _seen_by(settings, mean)
-    error = pose.T - shown - (mean[-3:] if memory else 0.0)
-    error = error.at[2].set(wrap(error[2]))
+    shown, camera = seen_by(settings, mean)
+    error = missed_by(pose.T, shown + (mean[-3:] if memory else 0.0))
     whole, total, far = mean, jnp.zeros_like(mean[0]), jnp.zeros_like(seen)
     for k, (sd, white) in enumerate((_camera(noise)[0], *_camera(noise))):
         weights = jnp.zeros_like(mean).at[:3].set(camera[k])
@@ -174,13 +166,6 @@ def _take_in(settings, noise: Noise, belief: _Belief, pose: Array, seen: Array) 
     taken = seen & ~far
     mean, doubtful = jnp.where(taken, mean, belief.mean), jnp.where(seen, DOUBT, 1.0) * belief.start
     return belief._replace(mean=mean, start=jnp.where(taken, covariance, doubtful)), total
-
-
-def _seen_by(settings, mean: Array) -> tuple[Array, Array]:
-    """The reported pose (3, n) of a state (states, n), and its derivatives (3, 3, n) by the true one."""
-    nudged = mean[:3, None] + NUDGE * jnp.eye(4)[1:, :, None]  # the first lane as it stands
-    lanes = jnp.stack(report(settings, *nudged))
-    return lanes[:, 0], (lanes[:, 1:] - lanes[:, :1]) / NUDGE
 
 
 def _between(left: Array, middle: Array) -> Array:
