@@ -17,6 +17,7 @@ HEATS = {f"own heat {tau:g} s": tau for tau in HEAT_TIMES}
 CHANGES = {f"own change {tau:g} s": tau for tau in CHANGE_TIMES}
 MEMORIES = HEATS | CHANGES
 """Signals that remember the wheel's own command, and the time constant [s] of each."""
+SENSE = "own sense"
 REVERSALS = {"since reversal" + (f" {tau:g} s" if tau else ""): tau for tau in REVERSAL_TIMES}
 DIRECTIONS = {"direction" + (f" {tau:g} s" if tau else ""): tau for tau in REVERSAL_TIMES}
 """The time since a mean of the commands last changed its sign, and this sign; time constant [s] of each mean."""
@@ -61,9 +62,9 @@ OF_CAMERA = ("heading", "x", "y")
 """Signals that a camera's error may depend on."""
 TIMES = {"1": "", "v": "m/s", "w": "rad/s", "cos heading": "", "sin heading": "", "own push": UNIT,
          "own speed": UNIT, "v cos heading": "m/s", "v sin heading": "m/s",
-         **dict.fromkeys(CHANGES, UNIT), **dict.fromkeys(DIRECTIONS, "")}  # fmt: skip
+         **dict.fromkeys(CHANGES, UNIT), **dict.fromkeys(DIRECTIONS, ""), SENSE: ""}  # fmt: skip
 """What a curve may be multiplied with, and the unit. direction: 1 forward, -1 backward, as the commands' sum or its
-mean over some seconds says."""
+mean over some seconds says. own sense: 1 where the wheel's command was last raised, -1 where it was lowered."""
 
 
 def value_name(law: int, knot: int) -> str:
@@ -74,8 +75,8 @@ def value_name(law: int, knot: int) -> str:
 
 def remembered(past: Past, axis: int = 0) -> dict[str, Any]:
     """What the commands of each wheel left behind, by signal. axis: that of the time constants."""
-    each = (row for part in (past.heat, past.change) for row in jnp.moveaxis(part, axis, 0))
-    return dict(zip(MEMORIES, each, strict=True))
+    each = (row for part in (past.heat, past.change, past.sense) for row in jnp.moveaxis(part, axis, 0))
+    return dict(zip([*MEMORIES, SENSE], each, strict=True))
 
 
 def directions(past: Past, axis: int = 0) -> dict[str, Any]:

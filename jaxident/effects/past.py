@@ -1,9 +1,10 @@
 """What the commands of a run leave behind, for laws that depend on more than the present: which way the robot goes and
-since when, how warm each motor is, and how far each command has just changed.
+since when, how warm each motor is, and how far and which way each command has just changed.
 
     s' = (u_r + u_l - s) / tau, a direction, the sign of s, for each tau of REVERSAL_TIMES
     heat' = (u^2 - heat) / tau, one heat for each wheel and each tau of HEAT_TIMES
     change = u - mean, mean' = (u - mean) / tau, one mean for each wheel and each tau of CHANGE_TIMES
+    sense, the sign of the last change of u, one for each wheel: behind a play of w lags by w times this
 
 All of it follows from the times and the commands alone, so that it is the same for every robot and needs no state.
 """
@@ -38,11 +39,12 @@ class Past(NamedTuple):
     """reversal (times, 2, ...): by each of REVERSAL_TIMES the direction, -1, 1, or 0 before a first command, and the
     time since it last changed [s], at most LONGEST; heat (times, 2, ...) [unit^2]: of the right and the left motor by
     each of HEAT_TIMES. Times and heats are those of the middle of a row. change (times, 2, ...) [unit]: of both
-    commands by each of CHANGE_TIMES, the mean over a row."""
+    commands by each of CHANGE_TIMES, the mean over a row. sense (1, 2, ...): -1, 1, or 0 before a first command."""
 
     reversal: Any
     heat: Any
     change: Any
+    sense: Any
 
 
 def past_of(t: Array, command: Array) -> Past:
@@ -53,8 +55,9 @@ def past_of(t: Array, command: Array) -> Past:
     mean_taus = jnp.reshape(jnp.array(REVERSAL_TIMES), (-1, *[1] * step[0].ndim))
 
     def body(carry, row):
-        smooth, direction, since, heat, mean = carry
+        smooth, direction, since, heat, mean, last, sense = carry
         u, h = row
+        sense = jnp.where(u == last, sense, jnp.sign(u - last))
         kept = jnp.where(mean_taus > 0.0, jnp.exp(-h / jnp.where(mean_taus > 0.0, mean_taus, 1.0)), 0.0)
         smooth = kept * smooth + (1.0 - kept) * (u[0] + u[1])
         since = jnp.where(smooth * direction < 0.0, 0.0, since)
@@ -62,15 +65,16 @@ def past_of(t: Array, command: Array) -> Past:
         midway, after = (heat + (u**2 - heat) * -jnp.expm1(-part * h / taus) for part in (0.5, 1.0))
         nearer = -jnp.expm1(-h / own_taus)
         reversal = jnp.stack([direction, jnp.minimum(since + 0.5 * h, LONGEST)], axis=1)
-        past = Past(reversal, midway, (u - mean) * nearer * own_taus / h)
-        return (smooth, direction, jnp.minimum(since + h, LONGEST), after, mean + (u - mean) * nearer), past
+        past = Past(reversal, midway, (u - mean) * nearer * own_taus / h, sense[None])
+        return (smooth, direction, jnp.minimum(since + h, LONGEST), after, mean + (u - mean) * nearer, u, sense), past
 
     still = jnp.zeros((len(REVERSAL_TIMES), *t[0].shape))
     warm = (jnp.zeros((len(times), *sent.shape[1:])) for times in (HEAT_TIMES, CHANGE_TIMES))
-    return jax.lax.scan(body, (still, still, still + LONGEST, *warm), (sent, step))[1]
+    rest = jnp.zeros(sent.shape[1:])
+    return jax.lax.scan(body, (still, still, still + LONGEST, *warm, rest, rest), (sent, step))[1]
 
 
-NO_PAST = Past(*(np.zeros((1, len(times), 2)) for times in (REVERSAL_TIMES, HEAT_TIMES, CHANGE_TIMES)))
+NO_PAST = Past(*(np.zeros((1, len(times), 2)) for times in (REVERSAL_TIMES, HEAT_TIMES, CHANGE_TIMES, (0.0,))))
 """Of a run of one row whose past nobody asks for."""
 _past_of = jax.jit(past_of)
 

@@ -10,7 +10,7 @@ from jaxident.diagnosis.diagnose import Diagnosis
 from jaxident.diagnosis.discovery.forms import PATCH, beyond
 from jaxident.diagnosis.laws.kinds import Kind
 from jaxident.diagnosis.laws.not_shown import FEWEST, NotShown
-from jaxident.effects.law_kinds import ANGLE, CHANGES, DIRECTIONS, SIGNAL_WORDS
+from jaxident.effects.law_kinds import ANGLE, CHANGES, DIRECTIONS, SENSE, SIGNAL_WORDS
 from jaxident.report.page import Figure, Section, Table
 from jaxident.report.words import number, percent, plain, together
 
@@ -21,6 +21,7 @@ TIMES_WORDS = {
     "v cos heading": "speed along x times ", "v sin heading": "speed along y times ",
     **{name: f"change of that wheel's command over {tau:g} s times " for name, tau in CHANGES.items()},
     **dict.fromkeys(DIRECTIONS, "direction times "),
+    SENSE: "direction in which that wheel's command last changed times ",
 }  # fmt: skip
 SEEN = (
     "These laws are in no catalogue. They were found on the runs that fit, and runs that took no part in that confirm "

@@ -84,6 +84,27 @@ def test_changes_follow_their_equation(number):
     np.testing.assert_allclose(found, slow_change(t, command, CHANGE_TIMES[number]), atol=2e-3)
 
 
+def test_the_sense_of_a_command_is_that_of_its_last_change():
+    t, command = drive(200)
+    found = np.asarray(past_of(t, command).sense)[:, 0]
+    for k, wheel in np.ndindex(found.shape):
+        changes = np.diff(command[: k + 1, wheel], prepend=0.0)
+        changes = changes[changes != 0.0]
+        assert found[k, wheel] == (np.sign(changes[-1]) if len(changes) else 0.0)
+
+
+def test_a_play_lags_by_its_half_width_in_the_sense_of_the_command():
+    """Where each step of a command is wider than the play, the sense tells all of it."""
+    half, t = 0.1, 0.05 * np.arange(200.0)
+    command = np.repeat(np.random.default_rng(2).permutation(np.linspace(-1.0, 1.0, 8)), 25)
+    behind, followed = 0.0, []
+    for u in command:
+        behind = float(np.clip(behind, u - half, u + half))
+        followed.append(behind)
+    sense = np.asarray(past_of(t, np.stack([command] * 2, axis=1)).sense)[:, 0, 0]
+    np.testing.assert_allclose(followed, command - half * sense, atol=1e-12)
+
+
 @pytest.mark.parametrize("rows", [2, 511, 512, 513, 1400])
 def test_runs_that_are_filled_up_have_the_same_past(rows):
     t, command = drive(rows)
@@ -93,6 +114,7 @@ def test_runs_that_are_filled_up_have_the_same_past(rows):
     np.testing.assert_allclose(whole.reversal[:-1], plain.reversal[:-1], atol=1e-12)
     np.testing.assert_allclose(whole.heat[:-1], plain.heat[:-1], atol=1e-12)
     np.testing.assert_allclose(whole.change[:-1], plain.change[:-1], atol=1e-12)
+    np.testing.assert_array_equal(whole.sense, plain.sense)
 
 
 def test_runs_side_by_side_are_those_alone():
@@ -103,3 +125,4 @@ def test_runs_side_by_side_are_those_alone():
         np.testing.assert_allclose(both.reversal[..., k], alone.reversal)
         np.testing.assert_allclose(both.heat[..., k], alone.heat)
         np.testing.assert_allclose(both.change[..., k], alone.change)
+        np.testing.assert_array_equal(both.sense[..., k], alone.sense)

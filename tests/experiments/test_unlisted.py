@@ -31,7 +31,7 @@ def errors(kind: str, size: float = 1.0) -> float:
     robot = draw_robot(np.random.default_rng(3))
     model = dataclasses.replace(true_model(robot), noise=None)
     apart = []
-    for whole in as_logs(drive(robot, kind, size, 2, 5)):
+    for whole in as_logs(drive(robot, kind, size, 2, 5, first=200.0)):
         log = whole.rows(0, 121)
         start = ji.State(log.x[0], log.y[0], log.theta[0], 0.0, 0.0)
         made = ji.simulate(model, log, start=start)
@@ -78,6 +78,7 @@ def test_table_and_page_tell_of_every_robot(tmp_path):
         ("saddle", Kind("acceleration along", "cos heading", "x", "y")),
         ("hot", Kind("push of each wheel", "own push", "own heat 3 s")),
         ("castor", Kind("acceleration along", "v", "since reversal 0.3 s")),
+        ("rub", Kind("acceleration along", "v", "time")),
         ("coupled", Kind("acceleration in heading", "w", "v")),
         ("late", Kind("push of each wheel", "own change 0.03 s", "v")),
         ("brakes", Kind("push of each wheel", "1", "own speed", "own push")),

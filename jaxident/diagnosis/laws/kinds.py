@@ -18,6 +18,7 @@ from jaxident.effects.law_kinds import (
     PUSHES,
     REVERSALS,
     ROLLINGS,
+    SENSE,
     SIDEWAYS,
     TURN,
     WHEELS,
@@ -66,7 +67,9 @@ class Kind(NamedTuple):
             return "camera"
         if self.acts_on == SIDEWAYS:
             return "contact"
-        return SITE_OF_SIGNAL[self.times if self.times in CHANGES else self.signal]
+        return (
+            "actuation" if self.times == SENSE else SITE_OF_SIGNAL[self.times if self.times in CHANGES else self.signal]
+        )
 
 
 KINDS = (
@@ -81,6 +84,7 @@ KINDS = (
     *(Kind(WHEELS, "own push", signal) for signal in HEATS),
     *(Kind(WHEELS, change, signal) for change in CHANGES for signal in ("v", "w", "own speed")),
     *(Kind(WHEELS, "1", change) for change in CHANGES),
+    *(Kind(WHEELS, SENSE, signal) for signal in ("own push", "own speed")),
     Kind(WHEELS, "1", "own speed", "own push"),
     *(Kind(act, "1", signal) for act in (AHEAD, LEFT, TURN) for signal in ("heading", "x", "y")),
     *(Kind(act, times, "x", "y") for act, times in FLOOR),

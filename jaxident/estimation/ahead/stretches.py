@@ -35,7 +35,7 @@ class Stretch(NamedTuple):
     past: Past
 
 
-AXES = Stretch(1, 0, 1, 1, 1, 0, 1, 0, Past(3, 3, 3))
+AXES = Stretch(1, 0, 1, 1, 1, 0, 1, 0, Past(3, 3, 3, 3))
 """The axis of each part of a `Stretch` along which stretches lie side by side."""
 
 
