@@ -4,12 +4,12 @@ of the chain.
     what it adds = times * curve(signal), or times * surface(signal, second signal)
 
 A curve is straight between its knots and constant beyond them; so is a surface along each of its signals. times is 1,
-the speed v, the turn rate w, the cosine or sine of the heading, the direction, or of each wheel its speed, its push or
-how far its command has just changed. A robot that loses speed in turns has v times a curve of w; one that is slow on a
-patch of carpet has v times a surface of x and y; a floor that slopes differently from place to place makes two
-surfaces, one for each direction; a robot that follows the later, the faster it is has the change of each wheel's
-command times a curve of v; a wheel that is not round rolls by its speed times a curve of its angle, which is another
-one when each run begins.
+the speed v, the turn rate w, the cosine or sine of the heading, the direction, or of each wheel its speed, its push,
+or how far its command has just changed, or which way. A robot that loses speed in turns has v times a curve of w; one
+that is slow on a patch of carpet has v times a surface of x and y; a floor that slopes differently from place to place
+makes two surfaces, one for each direction; a robot that follows the later, the faster it is has the change of each
+wheel's command times a curve of v; a wheel that is not round rolls by its speed times a curve of its angle, which is
+another one when each run begins.
 Both integrators take laws from their settings (`with_laws`), under one name that no effect of the catalogue has.
 """
 

@@ -60,7 +60,7 @@ def discover(finding: Finding) -> list[Bending]:
     """
     windows = finding.data.windows._replace(wheels=None, turning=None)
     hidden = not_shown(finding.fit, windows)
-    if not (kinds := tuple(kind for kind in KINDS if not hidden.holds(kind))):
+    if not (kinds := tuple(kind for kind in KINDS if not hidden.hides(kind))):
         return []
     begin = Bending(finding.fit, (), finding.fit.covariance, finding.law)
     sets = [_go_on(windows, begin, first, kinds) for first in _near(windows, begin, kinds)[:MOST_SETS]]
@@ -92,7 +92,7 @@ def _near(windows: Windows, now: Bending, kinds: tuple[Kind, ...]) -> list[Worth
     return [each for each in found if each.worth > found[0].worth - SURE]
 
 
-def worthy(data: Data, fit: Solution, curves: tuple[Curve, ...], kinds: tuple[Kind, ...] = KINDS) -> list[Worthy]:
+def worthy(data: Data, fit: Solution, curves: tuple[Curve, ...], kinds: tuple[Kind, ...]) -> list[Worthy]:
     """The curves of some kinds that are worth SURE beside some others, about a fit that has these, the best first.
     Kinds that bring nearly as much as one are told with it."""
     responses = respond(np.exp(fit.vector[:2]), fit.linear.residual, data.windows)

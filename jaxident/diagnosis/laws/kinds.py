@@ -32,8 +32,8 @@ SITE_OF_SIGNAL = {
     "push right": "actuation", "push left": "actuation", **dict.fromkeys(REVERSALS, "contact"),
     "own speed": "drive", "own push": "actuation", ANGLE: "drive", **dict.fromkeys([*HEATS, *CHANGES], "actuation"),
 }  # fmt: skip
-"""The site of a law that acts on accelerations or pushes, by its signal; where a command's change is multiplied with a
-curve, by the change."""
+"""The site of a law that acts on accelerations or pushes, by its signal, unless a curve is multiplied with how a
+command has changed (`Kind.site`)."""
 NOMINAL = ("v", "w", "push right", "push left", "own speed", "own push")
 """Signals on which a force of the nominal robot depends, in a straight line."""
 FLOOR = ((ALONG, "1"), (ALONG, "v"), (ALONG, "cos heading"), (ALONG, "sin heading"), (HEADING, "1"), (HEADING, "w"),
@@ -67,9 +67,7 @@ class Kind(NamedTuple):
             return "camera"
         if self.acts_on == SIDEWAYS:
             return "contact"
-        return (
-            "actuation" if self.times == SENSE else SITE_OF_SIGNAL[self.times if self.times in CHANGES else self.signal]
-        )
+        return "actuation" if self.times in (*CHANGES, SENSE) else SITE_OF_SIGNAL[self.signal]
 
 
 KINDS = (

@@ -29,7 +29,7 @@ class NotShown(NamedTuple):
     still: tuple[str, ...] = ()
     together: tuple[tuple[str, str], ...] = ()
 
-    def holds(self, kind: Kind) -> bool:
+    def hides(self, kind: Kind) -> bool:
         """Whether these logs cannot show such a law."""
         untold = {*self.still, *itertools.chain(*self.together)}
         return self.windows is not None or not untold.isdisjoint({kind.signal, kind.second_signal})

@@ -53,20 +53,20 @@ def test_signals_go_together_where_each_follows_from_the_other(y, told):
     assert not_shown_along(path_with(y=y)).together == told
 
 
-def test_kinds_by_such_signals_are_held_back_and_no_others():
+def test_kinds_by_such_signals_are_not_looked_for_and_others_are():
     found = NotShown(still=("w",), together=(("x", "y"),))
-    assert found.holds(Kind(ALONG, "v", "w"))
-    assert found.holds(Kind(ALONG, "1", "x", "y"))
-    assert found.holds(Kind(HEADING, "w", "y"))
-    assert not found.holds(Kind(ALONG, "w", "v"))
-    assert not found.holds(Kind(WHEELS, "1", "own push"))
-    assert not any(NotShown().holds(kind) for kind in KINDS)
+    assert found.hides(Kind(ALONG, "v", "w"))
+    assert found.hides(Kind(ALONG, "1", "x", "y"))
+    assert found.hides(Kind(HEADING, "w", "y"))
+    assert not found.hides(Kind(ALONG, "w", "v"))
+    assert not found.hides(Kind(WHEELS, "1", "own push"))
+    assert not any(NotShown().hides(kind) for kind in KINDS)
 
 
 def test_few_windows_show_no_law():
     found = not_shown(None, Few(np.zeros(FEWEST - 1)))
     assert found == NotShown(windows=FEWEST - 1)
-    assert all(found.holds(kind) for kind in KINDS)
+    assert all(found.hides(kind) for kind in KINDS)
 
 
 def test_no_kind_no_candidate():
