@@ -38,7 +38,8 @@ BENT: Forms = {
     "c max(s - s0, 0)": lambda s, s0: np.maximum(s - s0, 0.0),
     "c max(s0 - s, 0)": lambda s, s0: np.maximum(s0 - s, 0.0),
     "c max(|s| - s0, 0)": lambda s, s0: np.maximum(np.abs(s) - s0, 0.0),
-    "c from s0 on": lambda s, s0: (s >= s0).astype(float),
+    # a step is as wide as the knots are apart
+    "c from s0 on": lambda s, s0: np.clip((s - s0) / (s[1] - s[0]) + 0.5, 0.0, 1.0),
     "c exp(-s / s0)": lambda s, s0: np.exp(-s / s0),
 }
 """Forms that begin at some s0."""

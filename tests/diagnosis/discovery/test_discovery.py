@@ -93,6 +93,19 @@ def test_simple_forms_are_recognised(kind, value, form):
     assert found.part_explained > 0.95
 
 
+@pytest.mark.parametrize("instant", [-0.35, 0.25, 0.4])
+def test_a_step_is_placed_between_the_knots_where_it_is(instant):
+    """A curve has the mean of the step over each knot's hat."""
+    fine = np.linspace(-1.3, 1.3, 4001)
+    weight = hats(fine, AT)
+    value = (weight * (fine >= instant)[:, None]).sum(axis=0) / weight.sum(axis=0)
+    law = as_law(curve_of(Kind("acceleration along", "v", "time"), value))
+    found = form_of(law, np.full(len(AT), 9))
+    assert found is not None
+    assert found.form == "c from s0 on"
+    assert abs(found.parameters["s0"] - instant) < 0.5 * (AT[1] - AT[0])
+
+
 def test_what_the_nominal_robot_has_as_well_is_taken_away():
     law = as_law(curve_of(Kind("push of each wheel", "1", "own push"), 0.4 * AT - 0.3 * AT**3))
     left = beyond(law, np.ones(KNOTS))
