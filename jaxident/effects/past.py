@@ -4,7 +4,9 @@ since when, how warm each motor is, and how far and which way each command has j
     s' = (u_r + u_l - s) / tau, a direction, the sign of s, for each tau of REVERSAL_TIMES
     heat' = (u^2 - heat) / tau, one heat for each wheel and each tau of HEAT_TIMES
     change = u - mean, mean' = (u - mean) / tau, one mean for each wheel and each tau of CHANGE_TIMES
-    sense, the sign of the last change of u, one for each wheel: behind a play of w lags by w times this
+    sense = sign of the last change of u, one for each wheel
+
+What follows a command with play of half width b is at u - b sense, where each change of u is wider than the play.
 
 All of it follows from the times and the commands alone, so that it is the same for every robot and needs no state.
 """

@@ -57,6 +57,7 @@ LAWS = (
     ("push of each wheel", "1", "own speed", PUSHES[::2], 0.2 * SURFACE, None, "own push", PUSHES[::2]),
     ("push of each wheel", "own change 0.1 s", "v", PUSHES, -2.0 * np.abs(PUSHES)),
     ("push of each wheel", "1", "own change 0.3 s", 2.0 * PUSHES, -np.abs(PUSHES)),
+    ("push of each wheel", "own sense", "own push", PUSHES, -0.1 - 0.1 * PUSHES**2),
     ("acceleration along", "v", "since reversal", SINCE, -3.0 * np.exp(-SINCE / 0.4)),
     ("acceleration in heading", "direction 0.3 s", "since reversal 0.3 s", SINCE, 5.0 * np.exp(-SINCE / 0.4)),
     ("acceleration along", "v", "x", PUSHES[::2], SURFACE, None, "y", PUSHES[::2]),

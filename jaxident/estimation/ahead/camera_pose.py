@@ -11,7 +11,7 @@ NUDGE = 1e-6
 """Step of the differences by a pose [m], [rad]."""
 NEWTON_STEPS = 6
 """Towards the pose that a camera reports as another. Where lens and tilt made the picture up to twice as large, five
-steps brought it to 1e-11 m; steps that take the camera for straight ended 40 m away."""
+steps brought it to 1e-11 m; steps without slopes ended 40 m away."""
 
 
 def seen_by(settings, mean: Array) -> tuple[Array, Array]:
@@ -22,8 +22,8 @@ def seen_by(settings, mean: Array) -> tuple[Array, Array]:
 
 
 def shown_as(settings, pose: Array) -> Array:
-    """The robot's pose (3, n) that the camera reports as `pose` (3, n): Newton's steps, where they help. A lens may
-    bend the picture so much that steps which take the camera for straight run away."""
+    """The robot's pose (3, n) [m, m, rad] that the camera reports as `pose` (3, n), by Newton's method. A step that
+    comes no nearer is not taken. A lens may bend the picture so much that steps without its slopes run away."""
 
     def nearer(_, guess):
         shown, slope = seen_by(settings, guess)
@@ -36,6 +36,6 @@ def shown_as(settings, pose: Array) -> Array:
 
 
 def missed_by(pose: Array, shown: Array) -> Array:
-    """What a reported pose (3, n) lacks."""
+    """A reported pose (3, n) less the one that is shown [m, m, rad], headings by the shorter way round."""
     missed = pose - shown
     return missed.at[2].set(wrap(missed[2]))

@@ -113,7 +113,7 @@ def _turned(settings, belief: _Belief, guess: Array) -> _Belief:
 
 
 def _opened(wide: Array, belief: _Belief, opening: Array, speeds: Array, phase: Array | None, here: Array) -> _Belief:
-    """Where the filter begins: at the pose (3, n) that is reported first, hardly known; at some speeds, hardly known
+    """Where the filter begins: at the pose (3, n) whose report is the first, hardly known; at some speeds, hardly known
     either, or at those of the run-up, as well as it knows them; wheels that laws go by at a phase (laws, n)."""
     mean, start, slip, wheels = belief
     guessed = jnp.isfinite(speeds).all(axis=0)
