@@ -53,8 +53,9 @@ def not_shown_along(path: Path) -> NotShown:
 
 
 def _could_span(path: Path, span: dict[str, float]) -> dict[str, Any]:
-    """What a robot's signals could span with the largest commands. Speeds: from full speed backward to forward; heading:
-    a turn; x and y: the longer of both spans, or a second at full speed if that is more; since reversal: a second."""
+    """What a robot's signals could span with the largest commands. Speeds: from full speed backward to forward;
+    heading: a turn; x and y: the longer of both spans, or a second at full speed if that is more; since reversal: a
+    second."""
     speed, turning = 2.0 * np.abs(path.gain).sum(axis=1) / path.rates
     far = max(span["x"], span["y"], 0.5 * speed)
     return {"v": speed, "w": turning, "heading": 2.0 * np.pi, "x": far, "y": far, "push right": 2.0, "push left": 2.0,
