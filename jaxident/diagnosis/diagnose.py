@@ -1,6 +1,5 @@
 """One diagnosis from start to end: logs in; gap, place, causes, shrink and corrected model out."""
 
-import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -115,7 +114,8 @@ def diagnose(
 
     A third of the runs is kept for judging, the second and others two to five apart; of one or two runs, a third of
     their parts. Of a long log at most 16,000 rows fit and 8,000 judge, those whose commands tell most. The gap, its
-    account and how far it shrinks come from the rows that judge alone. Effects that the nominal model has are no gap.
+    account and how far it shrinks come from the rows that judge alone. Effects and discovered laws that the nominal
+    model has are no gap.
     Needs double precision and about a minute.
 
     Args:
@@ -145,14 +145,15 @@ def diagnose(
     require_float64("diagnose")
     check_nominal(logs, sim, model)
     simulator = None if model is None else as_simulator(model, logs)
-    prepared, finding = find_effects(prepare(logs, horizon, None if simulator is None else simulator.vector[:10]))
+    begin = None if simulator is None else simulator.vector
+    prepared, finding = find_effects(prepare(logs, horizon, begin, laws=() if model is None else model.discovered))
     if sim is not None:
         simulator, finding = inspect_simulator(sim, prepared, finding)
-    (finding, extra, shown, measured), refused, needless = believed(prepared, finding, simulator, model, seed)
+    (finding, extra, shown, measured), refused, needless = believed(prepared, finding, simulator, seed)
     gap, account, where, shrinks, corrected, laws, *_ = measured
     told = None if simulator is None else simulator.vector
     common, surplus = shared(shown, simulator)
-    judgement = judge(finding, gap, extra, simulator, () if model is not None and model.discovered else laws)
+    judgement = judge(finding, gap, extra, simulator, laws)
     selected = tuple(name for name in shown if name not in common) if judgement.none < 0.5 else ()
     known = answers(finding.data, finding.nominal, prepared.largest)
     parameters = compare_parameters(prepared, finding, told, common)
@@ -176,19 +177,19 @@ class Seen(NamedTuple):
 
 
 def believed(
-    prepared: Prepared, finding: Finding, simulator: Simulator | None, model: Model | None, seed: int
+    prepared: Prepared, finding: Finding, simulator: Simulator | None, seed: int
 ) -> tuple[Seen, tuple[str, ...], tuple[str, ...]]:
     """A finding measured on the rows kept for judging, the effects that these rows refuse, and those that discovered
     laws make needless. While some are refused, it is measured again without them; then without the needless ones,
     unless these rows are predicted worse then."""
     refused: tuple[str, ...] = ()
-    seen = see(prepared, finding, simulator, model, seed)
+    seen = see(prepared, finding, simulator, seed)
     while more := seen.measured.refused:
         refused = (*refused, *more)
-        seen = see(prepared, finding_without(seen.finding, more), simulator, model, seed)
+        seen = see(prepared, finding_without(seen.finding, more), simulator, seed)
     needless = seen.measured.needless
     if needless:
-        other = see(prepared, finding_without(seen.finding, needless), simulator, model, seed)
+        other = see(prepared, finding_without(seen.finding, needless), simulator, seed)
         if not other.measured.refused and not worse(other.measured.gap, seen.measured.gap, seed):
             return other, refused, needless
     return seen, refused, ()
@@ -201,15 +202,13 @@ def worse(own: Gap, other: Gap, seed: int) -> bool:
     return share > 0.0 and p_value < LOW
 
 
-def see(prepared: Prepared, finding: Finding, simulator: Simulator | None, model: Model | None, seed: int) -> Seen:
-    """A finding on the rows kept for judging. `model`: the nominal model where one was given."""
+def see(prepared: Prepared, finding: Finding, simulator: Simulator | None, seed: int) -> Seen:
+    """A finding on the rows kept for judging."""
     extra = direct_evidence(prepared, finding, CLAIMED if simulator is None else simulator.price)
     shown = present(finding, extra)
     common, _ = shared(shown, simulator)
     direct = direct_effects(prepared, finding, shown)
     given = None if simulator is None else as_model(prepared, simulator.vector, finding.law, simulator.effects, direct)
-    if given is not None and model is not None:
-        given = dataclasses.replace(given, discovered=model.discovered)
     return Seen(finding, extra, shown, measure(prepared, finding, given, common, direct, seed))
 
 

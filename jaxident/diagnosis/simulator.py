@@ -117,7 +117,7 @@ def rarer(
 def _search(sim: Log | Sequence[Log], prepared: Prepared, finding: Finding) -> tuple[Prepared, Finding, bool]:
     """The search of a simulator's logs: as far as the robot's camera could tell or, where they are as noisy themselves,
     under their own noise, some of their runs kept for judging; and whether they are."""
-    law, nominal = Law(*deviations(finding.law)[1:]), finding.nominal.vector[:10]
+    law, nominal = Law(*deviations(finding.law)[1:]), finding.nominal.vector
     own = prepare(sim, prepared.horizon, nominal, prepared, law)
     if is_noisy(first_law(own.windows), finding.law):
         return *find_effects(prepare(sim, prepared.horizon, nominal, prepared)), True

@@ -62,6 +62,29 @@ def laws_of(laws: Sequence[Discovered], largest: float = 1.0, surfaces: bool | N
                 np.ones((MOST_LAWS, 1)))  # fmt: skip
 
 
+def acting(laws: Laws | None) -> int:
+    """How many laws there are, those that only fill up left out."""
+    return 0 if laws is None else int(np.max(np.flatnonzero(np.any(laws.value != 0.0, axis=(1, 2))), initial=-1)) + 1
+
+
+def joined(laws: Laws | None, more: Laws) -> Laws:
+    """Some laws and some more, MOST_LAWS at most; phase and sure of both for the same runs or windows."""
+    if laws is None:
+        return more
+    second = max(laws.second_at.shape[1], more.second_at.shape[1])
+    first, then = (_with_second(part, second) for part in (laws, more))
+    count = acting(laws)
+    return Laws(*(np.concatenate([one[:count], other])[:MOST_LAWS] for one, other in zip(first, then, strict=True)))
+
+
+def _with_second(laws: Laws, second: int) -> Laws:
+    """Laws with so many second knots, at which curves have the same values."""
+    missing = second - laws.second_at.shape[1]
+    second_at = np.stack([_longer(row, missing) for row in laws.second_at])
+    value = np.pad(laws.value, [(0, 0), (0, 0), (0, missing)], mode="edge")
+    return laws._replace(second_at=second_at, value=value)
+
+
 def _padded(law: Discovered, second: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """MOST_KNOTS knots, so many second knots, and values (knots, second knots), the last repeated beyond the last."""
     at, second_at = np.asarray(law.at), np.arange(1.0) if law.second_at is None else np.asarray(law.second_at)

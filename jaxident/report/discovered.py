@@ -10,7 +10,7 @@ from jaxident.diagnosis.diagnose import Diagnosis
 from jaxident.diagnosis.discovery.forms import PATCH, beyond
 from jaxident.diagnosis.laws.kinds import Kind
 from jaxident.diagnosis.laws.not_shown import FEWEST, NotShown
-from jaxident.effects.law_kinds import ANGLE, CHANGES, DIRECTIONS, SENSE, SIGNAL_WORDS
+from jaxident.effects.law_kinds import ANGLE, CHANGES, DIRECTIONS, MOST_LAWS, SENSE, SIGNAL_WORDS
 from jaxident.report.page import Figure, Section, Table
 from jaxident.report.words import number, percent, plain, together
 
@@ -70,10 +70,12 @@ def _like(shown: Shown) -> str:
 
 
 def discovered(found: Diagnosis) -> list[Section]:
-    """The section on discovered laws and on those that were not looked for; none where there is nothing of that."""
-    hidden = not_looked_for(found.not_shown)
+    """The sections on laws of the model that was given, on discovered ones, and on those that were not looked for; none
+    where there is nothing of that."""
+    given, hidden = given_laws(found), not_looked_for(found.not_shown)
+    before = [Section("Laws that the given model has", given)] if given else []
     if not found.discovered:
-        return [Section(NOT_SHOWN, hidden)] if hidden else []
+        return [*before, Section(NOT_SHOWN, hidden)] if hidden else before
     rows = [
         (shown.law.acts_on, f"{_words(shown.kind)}{_each_turn(shown)}",
          percent(shown.share), f"{shown.p_value:.2g}", _form(shown))
@@ -82,8 +84,20 @@ def discovered(found: Diagnosis) -> list[Section]:
     table = Table(("acts on", "what is added", "share of the error", "probability by chance", "looks like"), rows)
     pictures = [_picture(shown) for shown in found.discovered]
     wheels = [OF_WHEEL] if any(shown.law.signal == ANGLE for shown in found.discovered) else []
-    return [Section("What was discovered", [SEEN, *wheels, *pictures, table, *_other_forms(found), *_alike(found),
-                                              *hidden])]  # fmt: skip
+    return [*before, Section("What was discovered", [SEEN, *wheels, *pictures, table, *_other_forms(found),
+                                                       *_alike(found), *hidden])]  # fmt: skip
+
+
+def given_laws(found: Diagnosis) -> list[str]:
+    """The laws that the given model has: what was done with them, and a line each."""
+    laws = found.nominal_model.discovered
+    if not laws:
+        return []
+    full = f" A model has room for {MOST_LAWS}: no more were looked for." if len(laws) == MOST_LAWS else ""
+    words = [_words(Kind(law.acts_on, law.times, law.signal, law.second_signal)) for law in laws]
+    return [f"The model that was given has laws in no catalogue. Every fit obeys them as they are, and so does the "
+            f"corrected model: they are no gap.{full}",
+            *(f"To the {law.acts_on} comes {told}." for law, told in zip(laws, words, strict=True))]  # fmt: skip
 
 
 def not_looked_for(hidden: NotShown) -> list[str]:

@@ -1,5 +1,6 @@
 """The page of a diagnosis, of one made up for each verdict."""
 
+import dataclasses
 import functools
 
 import numpy as np
@@ -18,6 +19,7 @@ from jaxident.diagnosis.laws.not_shown import NotShown
 from jaxident.diagnosis.smallest_effects import smallest_sizes
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.coordinates import COORDINATES
+from jaxident.effects.law_kinds import MOST_LAWS
 from jaxident.files.diagnosis import diagnosis_to_dict, law_to_dict
 from jaxident.report import Figure, Table, render
 from jaxident.report.account import account_lines, places_line
@@ -289,6 +291,21 @@ def test_a_side_of_the_marker_that_nothing_tells_is_said(effects, told):
         diagnosis_page(found._replace(finding=finding, selected=effects), "runs"), "Which effect causes it"
     ).blocks
     assert (BESIDE in blocks) == (not told)
+
+
+def test_laws_of_the_given_model_are_told_and_so_is_that_no_more_find_room():
+    law = discovered_law().law
+    few, full = (
+        diagnosis_page(_with_given_laws(made_up("no_gap"), (law,) * count), "runs") for count in (1, MOST_LAWS)
+    )
+    first, second = section(few, "Laws that the given model has").blocks
+    assert "no more were looked for" not in first
+    assert second.startswith(f"To the {law.acts_on} comes ")
+    assert "room for 3: no more were looked for" in section(full, "Laws that the given model has").blocks[0]
+
+
+def _with_given_laws(found, laws):
+    return found._replace(nominal_model=dataclasses.replace(found.nominal_model, discovered=laws))
 
 
 def test_discovered_laws_have_a_section_a_picture_and_a_sentence():

@@ -37,10 +37,11 @@ def sized_corrected(
 
 
 def with_curves(corrected: Corrected, bending: Bending | None, largest: float) -> Corrected:
-    """The corrected model with curves, and the covariance of its parameters and the curves' values."""
+    """The corrected model with curves beside the laws that it has, and the covariance of its parameters and the curves'
+    values."""
     if bending is None:
         return corrected
-    kept = tuple(as_law(curve, largest) for curve in bending.curves)
+    kept = (*corrected.model.discovered, *(as_law(curve, largest) for curve in bending.curves))
     order, covariance = _covariance(bending, corrected.model, largest)
     model = dataclasses.replace(corrected.model, discovered=kept, parameter_order=order, covariance=covariance)
     return corrected._replace(model=model)
@@ -55,7 +56,8 @@ def _covariance(bending: Bending, model: Model, largest: float) -> tuple[tuple[s
     own, (rows, columns) = len(units), slope.shape
     whole = np.zeros((rows + own, columns + own))
     whole[:rows, :columns], whole[rows:, columns:] = slope, np.diag(units)
-    values = [value_name(k, knot) for k, curve in enumerate(bending.curves) for knot in range(len(curve.value))]
+    first = len(model.discovered)
+    values = [value_name(k, knot) for k, curve in enumerate(bending.curves, first) for knot in range(len(curve.value))]
     return (*names, *values), whole @ bending.covariance @ whole.T
 
 

@@ -15,7 +15,7 @@ from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.diagnosis.noise.law import Law
 from jaxident.effects.coordinates import limits
-from jaxident.effects.law_arrays import Laws, laws_of
+from jaxident.effects.law_arrays import joined, laws_of
 from jaxident.effects.law_kinds import TURNING, scaled
 from jaxident.robot.model import Discovered
 
@@ -62,16 +62,16 @@ class _Around(NamedTuple):
     summed: Any
 
 
-def laws_from(curves: tuple[Curve, ...], windows: Windows) -> Laws | None:
-    """The curves as the integrators take them, on some windows."""
+def obeying(windows: Windows, curves: tuple[Curve, ...]) -> Windows:
+    """The windows of a robot that obeys some curves, too."""
     laws = laws_of([as_law(curve) for curve in curves])
     if laws is None:
-        return None
+        return windows
     phase = np.zeros((len(laws.phase), len(windows.run)))
     for k, curve in enumerate(curves):
         if curve.turning is not None:
             phase[k] = curve.turning.phase
-    return laws._replace(phase=phase)
+    return windows._replace(laws=joined(windows.laws, laws._replace(phase=phase)))
 
 
 def as_law(curve: Curve, largest: float = 1.0) -> Discovered:
@@ -90,7 +90,7 @@ def curve_columns(fit: Solution, data: Data, curves: tuple[Curve, ...]) -> np.nd
     if not curves:
         return none
     responses = respond(np.exp(fit.vector[:2]), fit.linear.residual, data.windows)
-    path = path_of(fit, data.windows, laws_from(curves, data.windows))
+    path = path_of(fit, obeying(data.windows, curves))
     columns = [columns_of(curve.kind, curve.at, path, responses, curve.turning) for curve in curves]
     return np.concatenate(columns, axis=2)
 
@@ -118,7 +118,7 @@ def refit_with(data: Data, fit: Solution, curves: tuple[Curve, ...]) -> tuple[So
     the covariance of all but start states."""
     low, high = (bound[fit.places] for bound in limits())
     smooth = smoothness(curves)
-    starts, cost = best_starts(data, fit.vector, fit.starts, np.zeros_like(fit.starts), laws_from(curves, data.windows))
+    starts, cost = best_starts(_obeying(data, curves), fit.vector, fit.starts, np.zeros_like(fit.starts))
     cost = cost + unlikeliness(fit.vector, data.windows) + _roughness(curves, smooth)
     now = fit._replace(starts=starts)
     around = _look(data, now, curves, smooth)
@@ -139,9 +139,13 @@ def refit_with(data: Data, fit: Solution, curves: tuple[Curve, ...]) -> tuple[So
     return _arrived(data, now._replace(linear=around.linear, cost=cost), curves, around)
 
 
+def _obeying(data: Data, curves: tuple[Curve, ...]) -> Data:
+    return data._replace(windows=obeying(data.windows, curves))
+
+
 def _look(data: Data, now: Solution, curves: tuple[Curve, ...], smooth: Array) -> _Around:
     """The linearisation about a fit and its curves."""
-    linear = linearise(now.vector, now.starts, data.windows, now.places, laws_from(curves, data.windows))
+    linear = linearise(now.vector, now.starts, obeying(data.windows, curves), now.places)
     columns = curve_columns(now._replace(linear=linear), data, curves)
     whole = np.concatenate([linear.slopes, columns, linear.residual[..., None]], axis=2)
     found = gram(data.whitener, whole, linear.starts)
@@ -158,7 +162,7 @@ def _moved(data: Data, now: Solution, curves, around: _Around, step: Array, boun
     step = np.concatenate([vector[now.places] - now.vector[now.places], step[own:]])
     bent = _with_values(curves, _values(curves) + step[own:])
     moved = around.gram.solve[:, :, -1] - around.gram.solve[:, :, :-1] @ step
-    starts, cost = best_starts(data, vector, now.starts, moved.T, laws_from(bent, data.windows))
+    starts, cost = best_starts(_obeying(data, bent), vector, now.starts, moved.T)
     return vector, bent, starts, cost + unlikeliness(vector, data.windows)
 
 

@@ -18,7 +18,7 @@ from jaxident.diagnosis.discovery.fit import (
     Bending,
     Curve,
     curve_columns,
-    laws_from,
+    obeying,
     prior_of,
     refit_with,
     smoothness,
@@ -33,6 +33,7 @@ from jaxident.diagnosis.motion.linear import without_starts
 from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.diagnosis.noise.sizing import size_noise
+from jaxident.effects.law_arrays import acting
 from jaxident.effects.law_kinds import MOST_LAWS
 
 PRICE = float(np.log(len(KINDS)))
@@ -53,14 +54,16 @@ class Worthy(NamedTuple):
 
 def discover(finding: Finding) -> list[Bending]:
     """Fits with one curve, two and so on; none where nothing is worth it. Poses alone judge a curve. Kinds that these
-    logs cannot show are not looked for (`not_shown`).
+    logs cannot show are not looked for (`not_shown`), and laws of a model that was given take room from the MOST_LAWS
+    that a model may have.
 
     Where evidence hardly tells which curve comes first, the search goes on from each of these, and the set that is
     worth most is kept: one curve may stand for two others together.
     """
     windows = finding.data.windows._replace(wheels=None, turning=None)
     hidden = not_shown(finding.fit, windows)
-    if not (kinds := tuple(kind for kind in KINDS if not hidden.hides(kind))):
+    kinds = tuple(kind for kind in KINDS if not hidden.hides(kind))
+    if not kinds or acting(windows.laws) == MOST_LAWS:
         return []
     begin = Bending(finding.fit, (), finding.fit.covariance, finding.law)
     sets = [_go_on(windows, begin, first, kinds) for first in _near(windows, begin, kinds)[:MOST_SETS]]
@@ -69,8 +72,8 @@ def discover(finding: Finding) -> list[Bending]:
 
 def _go_on(windows: Windows, begin: Bending, first: Worthy, kinds: tuple[Kind, ...]) -> tuple[float, list[Bending]]:
     """What a first curve and the best ones beside it are worth, and fits with one of them, two and so on."""
-    total, found = first.worth, [_with(windows, begin, first.curve)]
-    while len(found) < MOST_LAWS and (more := _near(windows, found[-1], kinds)):
+    total, found, room = first.worth, [_with(windows, begin, first.curve)], MOST_LAWS - acting(windows.laws)
+    while len(found) < room and (more := _near(windows, found[-1], kinds)):
         total += more[0].worth
         found.append(_with(windows, found[-1], more[0].curve))
     return total, found
@@ -98,7 +101,7 @@ def worthy(data: Data, fit: Solution, curves: tuple[Curve, ...], kinds: tuple[Ki
     responses = respond(np.exp(fit.vector[:2]), fit.linear.residual, data.windows)
     base, prior = _base(data, fit, curves)
     found: list[Worthy] = []
-    path = path_of(fit, data.windows, laws_from(curves, data.windows))
+    path = path_of(fit, obeying(data.windows, curves))
     turning = turnings(data, fit, base, path, responses)
     periodic = (of_wheel(*pair, path, responses) for pair in turning)
     for each in itertools.chain(candidates(path, responses, kinds), periodic):

@@ -11,7 +11,6 @@ from jaxident.diagnosis.motion.rims import Rims, rim_speeds
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.coordinates import INSTANTS, NOMINAL, PLACES, STEPPED, free_places, limits, neutral_vector, sizes
 from jaxident.effects.effect import EDGE
-from jaxident.effects.law_arrays import Laws
 
 MOST_STEPS = 20
 """Of one refit; what fits arrives in two to nine, what crawls is mostly an effect that is not there."""
@@ -134,19 +133,17 @@ def _around(data: Data, vector: Array, starts: Array, places: list[int]) -> tupl
     return linear, with_prior(found.products.sum(axis=0), vector, data.windows), found.solve
 
 
-def best_starts(
-    data: Data, vector: Array, starts: Array, moved: Array, laws: Laws | None = None
-) -> tuple[np.ndarray, float]:
+def best_starts(data: Data, vector: Array, starts: Array, moved: Array) -> tuple[np.ndarray, float]:
     """Starts (5, windows) moved in every window by the part of what is asked for (5, windows) that fits best, and half
     the squares: one window that shows little of its start must not stop the others."""
     lanes = starts + np.array(PARTS)[:, None, None] * moved
-    found = follow(np.tile(vector, (len(lanes), 1)), lanes, data.windows, laws)
+    found = follow(np.tile(vector, (len(lanes), 1)), lanes, data.windows)
     residual = np.ascontiguousarray(np.moveaxis(found, 0, -1))  # the whitener is read once for all of them
     with np.errstate(over="ignore", invalid="ignore"):  # a start may run away
         squares = 0.5 * np.sum((data.whitener @ residual) ** 2, axis=1).T
         if data.rims is not None:
             lots = np.tile(vector, (len(lanes), 1))
-            squares = squares + data.rims.squares(rim_speeds(lots, lanes, data.windows, laws))
+            squares = squares + data.rims.squares(rim_speeds(lots, lanes, data.windows))
     squares = np.where(np.isnan(squares), np.inf, squares)
     best = np.argmin(squares, axis=0)
     chosen = np.take_along_axis(lanes, best[None, None], axis=0)[0]

@@ -17,7 +17,6 @@ from jaxident.diagnosis.motion.linear import motion_of
 from jaxident.diagnosis.motion.paths import left_behind
 from jaxident.diagnosis.motion.responses import Responses
 from jaxident.diagnosis.motion.windows import Windows
-from jaxident.effects.law_arrays import Laws
 from jaxident.effects.law_kinds import (
     AHEAD,
     ALONG,
@@ -87,13 +86,13 @@ class Candidate(NamedTuple):
     turning: Turning | None = None
 
 
-def path_of(fit: Solution, windows: Windows, laws: Laws | None = None) -> Path:
-    """The signals along the path of a fit with some laws."""
-    motion = motion_of(fit.vector, fit.starts, windows, laws)
+def path_of(fit: Solution, windows: Windows) -> Path:
+    """The signals along the path of a fit."""
+    motion = motion_of(fit.vector, fit.starts, windows)
     x, y, theta, v, w, push = (np.asarray(part) for part in motion)
     rates, gain = np.exp(fit.vector[:2]), fit.vector[2:6].reshape(2, 2)
     speeds = np.stack([rates[0] * v, rates[1] * w], axis=-1) @ np.linalg.pinv(gain).T
-    step, past = np.asarray(windows.step).T, _left_behind(windows)
+    step, past = np.asarray(windows.step).T, _left_behind(windows._replace(laws=None))
     begin = windows.session[windows.run] + windows.t[windows.first, windows.run]
     time = begin[:, None] + np.cumsum(step, axis=1) - step
     heading = (theta + np.pi) % (2.0 * np.pi) - np.pi

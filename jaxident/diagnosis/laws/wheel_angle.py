@@ -106,12 +106,12 @@ def _seen(data: Data, fit: Solution, residual: Array, path: Path, responses: Res
         turned_over = answers.transpose(0, 2, 1)
         products[k], asked[k] = turned_over @ answers, (turned_over @ residual[..., None])[..., 0]
     gone, turned = path.way[:, 0], path.turn[:, 0]
-    parts = _parts(np.asarray(data.windows.run))
+    parts = parts_of(np.asarray(data.windows.run))
     return _Seen(products, asked, path.way - gone[:, None], path.turn - turned[:, None], gone, turned, parts)
 
 
-def _parts(run: Array) -> list[np.ndarray]:
-    """The windows of each part of a run, LONGEST at most."""
+def parts_of(run: Array) -> list[np.ndarray]:
+    """The windows of each part of a run, LONGEST at most; run (windows,): of which run."""
     whole = [np.flatnonzero(run == number) for number in np.unique(run)]
     return [part for own in whole for part in np.array_split(own, int(np.ceil(len(own) / LONGEST)))]
 

@@ -16,7 +16,6 @@ from jaxident.diagnosis.motion.paths import push_of
 from jaxident.diagnosis.motion.windows import Windows
 from jaxident.effects.coordinates import BY_DRIVE, NOMINAL, PLACES, neutral_vector
 from jaxident.effects.fast_input import PUSHING, REMEMBERING, Push
-from jaxident.effects.law_arrays import Laws
 from jaxident.parallel import in_parallel
 from jaxident.programs import kept_program
 
@@ -34,18 +33,18 @@ _NEUTRAL = neutral_vector(np.zeros(len(NOMINAL)))
 
 
 def each_of(program: Callable[..., Any]) -> Callable[..., Any]:
-    """A program of one vector (SIZE,), starts (5, windows), push, windows and laws as one of several of the first
-    three: arrays (batch, ...) and a list of pushes. It keeps the name, by which `kept_program` tells programs apart."""
+    """A program of one vector (SIZE,), starts (5, windows), push and windows as one of several of the first three:
+    arrays (batch, ...) and a list of pushes. It keeps the name, by which `kept_program` tells programs apart."""
 
     @functools.wraps(program)
-    def of_several(vectors: Array, starts: Array, push: list[Push], windows: Windows, laws: Laws | None) -> Any:
+    def of_several(vectors: Array, starts: Array, push: list[Push], windows: Windows) -> Any:
         stacked = jax.tree.map(lambda *parts: jnp.stack(parts), *push)
-        return jax.vmap(program, in_axes=(0, 0, 0, None, None))(vectors, starts, stacked, windows, laws)
+        return jax.vmap(program, in_axes=(0, 0, 0, None))(vectors, starts, stacked, windows)
 
     return of_several
 
 
-def run_each(several: Callable[..., Any], vectors: Array, starts: Array, windows: Windows, laws: Laws | None) -> Any:
+def run_each(several: Callable[..., Any], vectors: Array, starts: Array, windows: Windows) -> Any:
     """Results (batch, ...) of a program that `each_of` made, at vectors (batch, SIZE) and starts (batch, 5, windows).
 
     The last vector fills up the last call, so that there is one program for any number of vectors.
@@ -54,7 +53,7 @@ def run_each(several: Callable[..., Any], vectors: Array, starts: Array, windows
     push = pushes_of(vectors, windows)
     size = AT_ONCE if len(windows.run) <= FEW_WINDOWS else 1
     blocks = [np.minimum(np.arange(k, k + size), count - 1) for k in range(0, count, size)]
-    lanes = [(vectors[block], starts[block], [push[k] for k in block], windows, laws) for block in blocks]
+    lanes = [(vectors[block], starts[block], [push[k] for k in block], windows) for block in blocks]
     found = in_parallel(several, lanes, ahead=False)
     return jax.tree.map(lambda *parts: np.concatenate(parts)[:count], *found)
 
@@ -71,6 +70,7 @@ def pushes_of(vectors: Array, windows: Windows) -> list[Push]:
     _, first, own = np.unique(driven, axis=0, return_index=True, return_inverse=True)
     size = AT_ONCE if windows.t.shape[1] <= FEW_PIECES else 1
     blocks = [np.resize(first[k : k + size], size) for k in range(0, len(first), size)]
+    windows = windows._replace(laws=None)  # they push nothing before the wheels
     found = in_parallel(_pushed, [(vectors[block], windows) for block in blocks], ahead=False)
     return [found[k // size][k % size] for k in own.ravel()]
 

@@ -52,15 +52,14 @@ _OF_MOTION = Push, Windows, Wheels, Laws
 _residuals, _tracked = kept_program(*_OF_MOTION)(each_of(residuals)), kept_program(*_OF_MOTION, State)(move)
 
 
-def follow(vectors: Array, starts: Array, windows: Windows, laws: Laws | None = None) -> np.ndarray:
+def follow(vectors: Array, starts: Array, windows: Windows) -> np.ndarray:
     """Residuals (batch, windows, numbers) at vectors (batch, SIZE) and starts (batch, 5, windows)."""
-    found = run_each(_residuals, vectors, starts, windows, laws)
+    found = run_each(_residuals, vectors, starts, windows)
     return found.transpose(0, 2, 1, 3).reshape(len(found), found.shape[2], -1)
 
 
-def linearise(vector: Array, starts: Array, windows: Windows, places: list[int], laws: Laws | None = None) -> Linear:
-    """At a vector (SIZE,) and starts (5, windows), by the coordinates at some places of the vector, beside discovered
-    laws, if any."""
+def linearise(vector: Array, starts: Array, windows: Windows, places: list[int]) -> Linear:
+    """At a vector (SIZE,) and starts (5, windows), by the coordinates at some places of the vector."""
     step = PART * sizes()
     _, high = limits()
     step = np.where(vector + step > high, -step, step)[places]
@@ -69,30 +68,30 @@ def linearise(vector: Array, starts: Array, windows: Windows, places: list[int],
     vectors[1 + np.arange(columns), places] += step
     lanes = np.tile(starts, (len(vectors), 1, 1))
     lanes[[-2, -1], [3, 4]] += START_STEPS[:, None]
-    found = follow(vectors, lanes, windows, laws)
+    found = follow(vectors, lanes, windows)
     change = np.moveaxis(found[:1] - found[1:], 0, -1)
     # by position and heading in closed form; a robot that loses speed to friction or in turns is not slowed as it says
     answers = answer_to_start(np.exp(vector[:2]), found[0], windows)
     answers[..., 3:] = change[..., columns:] / START_STEPS
-    return Linear(found[0], change[..., :columns] / step, answers, _of_rims(vectors, lanes, windows, laws, step))
+    return Linear(found[0], change[..., :columns] / step, answers, _of_rims(vectors, lanes, windows, step))
 
 
-def _of_rims(vectors: Array, lanes: Array, windows: Windows, laws: Laws | None, step: Array) -> Linear | None:
+def _of_rims(vectors: Array, lanes: Array, windows: Windows, step: Array) -> Linear | None:
     """Rims at the first of some vectors and starts, and what they gain by the others."""
     if windows.wheels is None:
         return None
-    found = rim_speeds(vectors, lanes, windows, laws)
+    found = rim_speeds(vectors, lanes, windows)
     change = np.moveaxis(found[1:] - found[:1], 0, -1)
     starts = np.zeros((*found.shape[1:], START_STATES))
     starts[..., 3:] = change[..., len(step) :] / START_STEPS
     return Linear(found[0], change[..., : len(step)] / step, starts)
 
 
-def motion_of(vector: Array, starts: Array, windows: Windows, laws: Laws | None = None) -> list[np.ndarray]:
+def motion_of(vector: Array, starts: Array, windows: Windows) -> list[np.ndarray]:
     """x, y, heading, v, w (windows, rows) at each row, and the mean pushes from there on (windows, rows, 2)."""
     windows = jax.tree.map(jnp.asarray, windows)
     (push,) = pushes_of(vector[None], windows)
-    states = [np.asarray(part).T for part in _tracked(vector, starts, push, windows, laws)]
+    states = [np.asarray(part).T for part in _tracked(vector, starts, push, windows)]
     return [*states, np.asarray(push.mean).mean(axis=1).transpose(2, 0, 1)]
 
 

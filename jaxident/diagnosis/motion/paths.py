@@ -15,11 +15,11 @@ from jaxident.numerics import wrap
 from jaxident.robot.drive import rim_motion
 
 
-def residuals(vector: Array, starts: Array, push: Push, windows: Windows, laws: Laws | None = None) -> Array:
+def residuals(vector: Array, starts: Array, push: Push, windows: Windows) -> Array:
     """Measured minus modelled poses (rows, windows, 3), 0 where unseen; starts (5, windows) of the robot itself, and
-    what `push_of` says drives its wheels; laws: discovered ones, if any."""
-    states = move(vector, starts, push, windows, laws)
-    return compare(report(with_laws(by_effect(vector), laws), *states.pose), windows)
+    what `push_of` says drives its wheels."""
+    states = move(vector, starts, push, windows)
+    return compare(report(with_laws(by_effect(vector), windows.laws), *states.pose), windows)
 
 
 def compare(pose: Pose, windows: Windows) -> Array:
@@ -28,9 +28,9 @@ def compare(pose: Pose, windows: Windows) -> Array:
     return jnp.where(windows.seen[..., None], jnp.stack([x, y, wrap(theta)], axis=-1), 0.0)
 
 
-def track(vector: Array, starts: Array, windows: Windows, laws: Laws | None = None) -> State:
+def track(vector: Array, starts: Array, windows: Windows) -> State:
     """True states (rows, windows) from starts (5, windows)."""
-    return move(vector, starts, push_of(vector, windows), windows, laws)
+    return move(vector, starts, push_of(vector, windows), windows)
 
 
 def push_of(vector: Array, windows: Windows, acts: Acts | None = None) -> Push:
@@ -42,15 +42,15 @@ def push_of(vector: Array, windows: Windows, acts: Acts | None = None) -> Push:
     return Push(*(part[places, windows.run].transpose(0, 2, 3, 1) for part in push))
 
 
-def move(vector: Array, starts: Array, push: Push, windows: Windows, laws: Laws | None = None) -> State:
+def move(vector: Array, starts: Array, push: Push, windows: Windows) -> State:
     """True states (rows, windows) under pushes (rows, substeps, 2, windows)."""
-    return _moved(vector, starts, push, windows, laws)[0]
+    return _moved(vector, starts, push, windows)[0]
 
 
-def rolled(vector: Array, starts: Array, push: Push, windows: Windows, laws: Laws | None = None) -> tuple[Array, Array]:
+def rolled(vector: Array, starts: Array, push: Push, windows: Windows) -> tuple[Array, Array]:
     """Speed [m/s] and turn rate [rad/s] (rows, windows) that the rims of both wheels have: those of the robot, and what
     wheels that slide turn faster than the ground."""
-    states, excess = _moved(vector, starts, push, windows, laws)
+    states, excess = _moved(vector, starts, push, windows)
     return rim_motion(drive_of(vector), states.v, states.w, Wheels(sum(excess[0::2]), sum(excess[1::2])))
 
 
@@ -61,9 +61,9 @@ def left_behind(windows: Windows) -> Past:
     return Past(*(jnp.moveaxis(part, -1, 1)[places, windows.run].transpose(0, 2, 3, 1) for part in past))
 
 
-def _moved(vector: Array, starts: Array, push: Push, windows: Windows, laws: Laws | None) -> tuple[State, list]:
+def _moved(vector: Array, starts: Array, push: Push, windows: Windows) -> tuple[State, list]:
     """True states, and by how much each wheel turns faster than the ground [unit]."""
-    settings, drive, part = with_laws(by_effect(vector), laws), drive_of(vector), windows.step / SUBSTEPS
+    settings, drive, part = with_laws(by_effect(vector), windows.laws), drive_of(vector), windows.step / SUBSTEPS
     time = windows.session[windows.run] + windows.t[windows.first, windows.run]
     begin = time + jnp.cumsum(windows.step, axis=0) - windows.step
 
@@ -71,12 +71,14 @@ def _moved(vector: Array, starts: Array, push: Push, windows: Windows, laws: Law
         state, wheels = carry
         return advance_row(settings, drive, state, wheels, row), (state, wheels.excess)
 
-    rows = Row(push.mean, push.slope, part, lags_of(drive, part), begin, None if laws is None else left_behind(windows))
-    return jax.lax.scan(body, (State(*starts), rolling(starts[0], first_angles(laws, windows))), rows)[1]
+    past = None if windows.laws is None else left_behind(windows)
+    rows = Row(push.mean, push.slope, part, lags_of(drive, part), begin, past)
+    return jax.lax.scan(body, (State(*starts), rolling(starts[0], first_angles(windows))), rows)[1]
 
 
-def first_angles(laws: Laws | None, windows: Windows) -> Array | None:
+def first_angles(windows: Windows) -> Array | None:
     """The angles (laws, windows) of the wheels that laws go by in the first row of each window; None without laws."""
-    if laws is None:
+    if windows.laws is None:
         return None
+    laws: Laws = windows.laws
     return laws.phase + laws.per_way @ windows.way

@@ -60,10 +60,10 @@ def untold(windows: Windows) -> frozenset[str]:
 _rolled = kept_program(Push, Windows, Wheels, Laws)(each_of(rolled))
 
 
-def rim_speeds(vectors: Array, starts: Array, windows: Windows, laws: Laws | None = None) -> np.ndarray:
+def rim_speeds(vectors: Array, starts: Array, windows: Windows) -> np.ndarray:
     """Speed [m/s] and turn rate [rad/s] of the rims (batch, windows, numbers) at vectors (batch, SIZE) and starts
     (batch, 5, windows)."""
-    speed, turn = run_each(_rolled, of_wheels(vectors), starts, windows, laws)
+    speed, turn = run_each(_rolled, of_wheels(vectors), starts, windows)
     return np.concatenate([speed, turn], axis=1).transpose(0, 2, 1)
 
 

@@ -25,7 +25,8 @@ class Windows(NamedTuple):
     the log; way (2, windows): way [m] and turn [rad] of the robot from the piece's first pose to that row, as measured
     (`ways`). wheels (rows, windows, 2) [rad/s], turning (rows, windows): wheel speeds, and where both were measured;
     None in logs without. held (4,): where the search holds the coordinates of `fit.prior.HOLDS`, NaN what it finds
-    itself.
+    itself. laws: discovered laws that the robot obeys (`Laws`, phase by window), commands over their largest; None
+    without.
     """
 
     t: Any
@@ -41,6 +42,7 @@ class Windows(NamedTuple):
     wheels: Any = None
     turning: Any = None
     held: Any = FREE
+    laws: Any = None
 
 
 class Piece(NamedTuple):
@@ -118,6 +120,8 @@ def uncut(commands: Array, period: float) -> Windows:
 
 def take(windows: Windows, chosen: Array) -> Windows:
     """Some of the windows; the runs stay whole."""
+    if windows.laws is not None:
+        windows = windows._replace(laws=windows.laws._replace(phase=windows.laws.phase[:, chosen]))
     if windows.wheels is not None:
         windows = windows._replace(wheels=windows.wheels[:, chosen], turning=windows.turning[:, chosen])
     return windows._replace(

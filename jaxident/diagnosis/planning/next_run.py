@@ -126,11 +126,11 @@ def separations(question: Question, commands: Array) -> np.ndarray:
     t, run = np.tile(question.period * np.arange(samples), count), np.repeat(np.arange(count), samples)
     right, left = commands.reshape(-1, 2).T
     log = make_log(t, right, left, x, y, theta, run)
-    windows = cut(log, question.rows)._replace(session=np.zeros(count))
+    windows = cut(log, question.rows)._replace(session=np.zeros(count), laws=question.laws)
     starts = states[:, windows.first, windows.run]
-    linear = linearise(question.base, starts, windows, list(range(len(NOMINAL))), question.laws)
+    linear = linearise(question.base, starts, windows, list(range(len(NOMINAL))))
     lanes = np.broadcast_to(starts, (len(question.vectors), *starts.shape))
-    moved = follow(question.vectors, lanes, windows, question.laws)
+    moved = follow(question.vectors, lanes, windows)
     columns = np.concatenate([linear.slopes, np.moveaxis(linear.residual - moved, 0, -1)], axis=2)
     products = gram(_whitener(question, linear.residual, windows), columns, linear.starts).products
     return np.array([_separation(question, products[windows.run == run].sum(axis=0)) for run in range(count)])
@@ -161,4 +161,4 @@ _track = jax.jit(track)
 
 def _paths(question: Question, whole: Windows) -> np.ndarray:
     """States (5, samples, inputs) of the robot without the two effects, from rest at the origin."""
-    return np.stack(_track(question.base, np.zeros((START_STATES, len(whole.run))), whole, question.laws))
+    return np.stack(_track(question.base, np.zeros((START_STATES, len(whole.run))), whole._replace(laws=question.laws)))

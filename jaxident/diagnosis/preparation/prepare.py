@@ -10,6 +10,7 @@ from jaxident.diagnosis.fit.refit import Solution
 from jaxident.diagnosis.motion.windows import Piece, Windows, cut, take
 from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.preparation.dropped_commands import Lost
+from jaxident.diagnosis.preparation.given_laws import obeying_given
 from jaxident.diagnosis.preparation.pose_screening import (
     Frames,
     find_more_outliers,
@@ -19,13 +20,14 @@ from jaxident.diagnosis.preparation.pose_screening import (
     has_outliers,
 )
 from jaxident.diagnosis.preparation.roles import rows_served, split
-from jaxident.effects.coordinates import neutral_vector
+from jaxident.effects.coordinates import NOMINAL, neutral_vector
 from jaxident.errors import InputError
 from jaxident.estimation.ahead.stretches import Starts
 from jaxident.estimation.increments.observations import blind, poses_only
 from jaxident.estimation.suspicions.checks import check_informative
 from jaxident.estimation.suspicions.wheel_suspicions import check_wheels
 from jaxident.log import Log, join, run_begins
+from jaxident.robot.model import Discovered
 
 BURN = 20
 """Rows from which a window's start state is estimated before the horizon begins."""
@@ -47,7 +49,8 @@ class Prepared(NamedTuple):
     naming: the same of the rows that fit, in the log `fitted` of these alone.
     nominal: the nominal fit. lost: the share of commands that never arrived, and the gain of
     saying so; the windows' commands are then those that did, those `sent` (rows of a piece, pieces, 2) are kept.
-    told (10,): the coordinates of a nominal model that was given, None without. served: rows that fit, and rows that
+    told (10,): the coordinates of a nominal model that was given, None without; laws: those in no catalogue that it
+    has, in the user's unit, which every fit obeys. served: rows that fit, and rows that
     judge; of a long log they are not all (`roles`).
     """
 
@@ -64,6 +67,7 @@ class Prepared(NamedTuple):
     lost: tuple[float, float] = (0.0, 0.0)
     sent: Any = None
     told: Any = None
+    laws: tuple[Discovered, ...] = ()
     served: tuple[int, int] = (0, 0)
 
     @property
@@ -78,8 +82,10 @@ def prepare(
     nominal: Array | None = None,
     like: "Prepared | None" = None,
     law: Law | None = None,
+    laws: tuple[Discovered, ...] = (),
 ) -> Prepared:
-    """Windows, roles and the nominal fit; `nominal` (10,) is where its search begins, from the data alone without.
+    """Windows, roles and the nominal fit; `nominal` (SIZE,) is where its search begins, from the data alone without;
+    laws: discovered ones that the nominal model has.
 
     With `like` the commands are scaled as there; with `law` the noise is taken for that and no run is kept apart: so
     are logs of a simulator without noise judged by what the robot's camera could see. InputError where the log says
@@ -101,10 +107,11 @@ def prepare(
     windows = stretches(fitted, BURN + rows, pieces)
     if like is None and not len(judging.row):
         raise InputError(TOO_SHORT.format(len(log.t), len(windows.run), BURN + rows))
-    vector = neutral_vector(starting_point(fitted, pieces) if nominal is None else nominal)
-    first = rough_fit(windows, vector, law)
+    vector = neutral_vector(starting_point(fitted, pieces)) if nominal is None else np.asarray(nominal)
+    told = None if nominal is None else vector[: len(NOMINAL)]
+    windows, first = obeying_given(windows, laws, largest, vector, law)
     found = Prepared(given, largest, windows, judging, naming, only(given, pieces), rows, horizon,
-                     Frames(frozen, frozen), first, told=nominal, served=rows_served(roles))  # fmt: skip
+                     Frames(frozen, frozen), first, told=told, laws=laws, served=rows_served(roles))  # fmt: skip
     if law is not None:
         return found
     outlying, windows, first = without_outliers(fitted, windows, first, pieces)
@@ -192,14 +199,18 @@ def without_outliers(
     """Rows that are outliers, and windows and nominal fit without them."""
     outlying = find_outliers(log, windows, fit)
     if outlying.any():
-        windows, fit = without_rows(log, outlying, fit, pieces)
+        windows, fit = without_rows(log, outlying, windows, fit, pieces)
     if has_outliers(outlying, int(np.isfinite(log.x).sum())):
         outlying |= find_more_outliers(blind(log, outlying), windows, fit)
-        windows, fit = without_rows(log, outlying, fit, pieces)
+        windows, fit = without_rows(log, outlying, windows, fit, pieces)
     return outlying, windows, fit
 
 
-def without_rows(log: Log, rows: Array, fit: Solution, pieces: list[Piece]) -> tuple[Windows, Solution]:
-    """Windows and the nominal fit without the poses of some rows, windows as long as those of a fit."""
-    windows = stretches(blind(log, rows), fit.linear.residual.shape[1] // 3, pieces)
-    return windows, rough_fit(windows, fit.vector)
+def without_rows(
+    log: Log, rows: Array, windows: Windows, fit: Solution, pieces: list[Piece]
+) -> tuple[Windows, Solution]:
+    """Windows, and the nominal fit there, without the poses of some rows."""
+    found = stretches(blind(log, rows), len(windows.step), pieces)
+    same = take(windows, np.searchsorted(windows.row, found.row))
+    found = found._replace(laws=same.laws)
+    return found, rough_fit(found, fit.vector)

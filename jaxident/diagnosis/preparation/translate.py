@@ -92,8 +92,9 @@ def to_model(
     direct: dict[str, dict] | None = None,
     fit: Solution | None = None,
 ) -> Model:
-    """Coordinates (SIZE,) as a model with its noise law and effects, `direct` ones by their parameters; with the
-    deviations and the covariance of a fit where one is given. Limits that never act are left out."""
+    """Coordinates (SIZE,) as a model with its noise law and effects, `direct` ones by their parameters, and the laws of
+    the model that was given; with the deviations and the covariance of a fit where one is given. Limits that never act
+    are left out."""
     held = held_rates(prepared.windows) if prepared.told is None else ()
     values = in_user_units(vector, prepared.largest)
     steps = np.concatenate([np.diff(run.t) for run in prepared.log.runs()])
@@ -107,6 +108,7 @@ def to_model(
         np.array(values[6:8]),
         noise=noise_of(law, BY_CHANCE["memory"] in (direct or {})),
         effects=tuple(found),
+        discovered=prepared.laws,
         covariance=covariance,
         parameter_order=order,
         provenance=with_session(Provenance(method="diagnosis", from_prior=held), prepared.log),

@@ -11,12 +11,12 @@ from jaxident.diagnosis.laws import wheel_angle
 from jaxident.diagnosis.laws.candidates import Path
 from jaxident.diagnosis.laws.wheel_angle import (
     _explained,
-    _parts,
     _powers,
     _Seen,
     _steps,
     _strongest,
     _waves,
+    parts_of,
     turnings,
 )
 from jaxident.diagnosis.motion.linear import Linear
@@ -157,7 +157,7 @@ def test_a_wheel_that_does_nothing_is_left_out():
 
 def test_a_long_run_is_searched_in_parts():
     run = np.repeat([0, 1, 2], [70, 1, 20])
-    parts = _parts(run)
+    parts = parts_of(run)
     assert max(map(len, parts)) <= wheel_angle.LONGEST
     np.testing.assert_array_equal(np.concatenate(parts), np.arange(91))
     assert [len(np.unique(run[own])) for own in parts] == [1] * len(parts)

@@ -173,11 +173,11 @@ def test_windows_go_on_at_the_angle_that_the_wheel_has_turned_to(log):
     driven = log._replace(x=np.asarray(states.x), y=np.asarray(states.y), theta=np.asarray(states.theta))
     windows = cut(driven, 25)
     starts = np.stack([np.asarray(part)[windows.row] for part in states])
-    begun = jax.jit(first_angles)(laws, windows)
+    begun = jax.jit(first_angles)(windows._replace(laws=laws))
     assert np.ptp(np.asarray(begun)[0]) > 2.0 * np.pi
     push, left_by = PUSH(nominal(), windows), jax.jit(residuals)
     left = [
-        float(jnp.abs(left_by(nominal(), starts, push, windows, each)).max())
+        float(jnp.abs(left_by(nominal(), starts, push, windows._replace(laws=each))).max())
         for each in (laws, laws._replace(phase=laws.phase + 0.5), None)
     ]
     assert left[0] < 0.03 * left[2]

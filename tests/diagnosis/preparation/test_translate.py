@@ -47,7 +47,7 @@ def test_a_limit_that_never_acts_is_none_of_the_model_and_has_no_size():
     vector[PLACES["turn_loss", "loss"]] = 0.3
     solution = Solution(vector, None, places, None, 0.0, 1e-6 * np.eye(len(places)), 1)
     log = make_log(0.03 * np.arange(9), np.ones(9), np.ones(9))
-    prepared = SimpleNamespace(log=log, largest=1.0, windows=SimpleNamespace(held=FREE), told=None)
+    prepared = SimpleNamespace(log=log, largest=1.0, windows=SimpleNamespace(held=FREE), told=None, laws=())
     model = to_model(prepared, vector, Law(1e-3, 5e-3), effects, None, solution)
     assert [effect.name for effect in model.effects] == ["turn_loss"]
     finding = SimpleNamespace(fit=solution, selected=effects)
