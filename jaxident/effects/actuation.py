@@ -70,7 +70,11 @@ def _pair(unit: str, size: float, typical: float, **more) -> tuple[Parameter, Pa
 
 
 def _steps(_: float) -> list[dict[str, float]]:
-    return [{"step": float(step)} for step in np.geomspace(0.02, 0.4, 96)]
+    return [_in_steps(float(step), form) for form in (0.0, 1.0) for step in np.geomspace(0.02, 0.4, 96)]
+
+
+def _in_steps(step: float, towards_zero: float) -> dict[str, float]:
+    return {"step": step, "towards_zero": towards_zero}
 
 
 def _polls(_: float) -> list[dict[str, float]]:
@@ -120,13 +124,16 @@ RECORDS = (
     EffectRecord(
         name="input_quantisation", site="actuation", stage="command", step=statements.QUANTISATION,
         words="commands act in steps",
-        equation="u -> q round(u / q)",
-        source="Widrow, Kollar 2008, Quantization Noise",
-        parameters=(Parameter("step", UNIT, 0.0, (0.01, 0.25), 0.15, least=0.0),),
+        equation="u -> q round(u / q), or q trunc(u / q)",
+        source="Widrow, Kollar 2008, Quantization Noise; ISO/IEC 9899 (C), 6.3.1.4: casts drop the fraction",
+        parameters=(Parameter("step", UNIT, 0.0, (0.01, 0.25), 0.15, least=0.0),
+                    Parameter("towards_zero", "", 0.0, (0.0, 1.0), 0.0, least=0.0, most=1.0, shape=True,
+                              forms=("to the nearest step", "towards zero"))),
         channels=BOTH,
         act=input_quantisation, rank=3, smooth=False, grid=(0.01, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25),
-        search=Search((positive("step", 0.6, stepped=True, reach=(1e-2, 2e-3, 2e-4), relative=True),), seeds=_steps,
-                      suggested=Suggested("steps", lambda step: {"step": float(step)})),
+        search=Search((positive("step", 0.6, stepped=True, reach=(1e-2, 2e-3, 2e-4), relative=True),
+                       Coordinate("towards_zero", 0.0, 0.0, 1.0, 1.0, shape=True, stepped=True)),
+                      seeds=_steps, suggested=Suggested("steps", _in_steps)),
     ),
     EffectRecord(
         name="input_rate_limit", site="actuation", stage="slew", step=statements.RATE_LIMIT,

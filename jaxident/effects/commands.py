@@ -1,5 +1,7 @@
 """Laws of the command before it reaches the motors: which value leaves, when it takes effect, how fast it changes."""
 
+from collections.abc import Callable
+
 import jax
 import jax.numpy as jnp
 
@@ -38,13 +40,14 @@ def twist_quantisation(u: Wheels, mean: Array, difference: Array) -> Wheels:
     return Wheels(*(jnp.where(exact, a, b) for a, b in zip(u, rounded, strict=True)))
 
 
-def input_quantisation(u: Wheels, step: Array) -> Wheels:
-    """round(u / q) q; a step of 0 passes u."""
-    return Wheels(*(_rounded(own, step) for own in u))
+def input_quantisation(u: Wheels, step: Array, towards_zero: Array) -> Wheels:
+    """round(u / q) q, or with `towards_zero` 1 the whole part of u / q times q, as a cast to an integer in C makes it;
+    a step of 0 passes u."""
+    return Wheels(*(jnp.where(towards_zero > 0.5, _rounded(own, step, jnp.trunc), _rounded(own, step)) for own in u))
 
 
-def _rounded(value: Array, step: Array) -> Array:
-    return jnp.where(step > 0.0, jnp.round(safe_divide(value, step, 0.0)) * step, value)
+def _rounded(value: Array, step: Array, whole: Callable[[Array], Array] = jnp.round) -> Array:
+    return jnp.where(step > 0.0, whole(safe_divide(value, step, 0.0)) * step, value)
 
 
 def transport_delay(time: Array, _: Array, delay: Array) -> Array:

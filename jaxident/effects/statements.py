@@ -47,8 +47,17 @@ def _rounded(name: str, value: str, step: str) -> str:
     return f"{name} = pick({step} > 0.0, round_even({value} / pick({step} > 0.0, {step}, 1.0)) * {step}, {value})"
 
 
+def _in_steps(s: str) -> tuple[str, ...]:
+    """A command rounded to the nearest step, or towards zero."""
+    return (
+        f"a = u_{s} / pick({{step}} > 0.0, {{step}}, 1.0)",
+        "a = pick({towards_zero} > 0.5, -sign(a) * ceil(-fabs(a)), round_even(a))",
+        f"u_{s} = pick({{step}} > 0.0, a * {{step}}, u_{s})",
+    )
+
+
 SATURATION = Step(_wheels(lambda s: f"u_{s} = clip(u_{s}, -{{level}}, {{level}})"))
-QUANTISATION = Step(_wheels(lambda s: _rounded(f"u_{s}", f"u_{s}", "{step}")))
+QUANTISATION = Step((*_in_steps("r"), *_in_steps("l")))
 TWIST = Step((
     _rounded("a", "(0.5 * (u_r + u_l))", "{mean}"),
     _rounded("b", "(u_r - u_l)", "{difference}"),

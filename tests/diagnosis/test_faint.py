@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support.small_robot import LAW, ROWS, RUNS, VECTOR, nominal_fit, windows_of
+from support.small_robot import LAW, ROWS, RUNS, VECTOR, nominal_fit, robot_with, windows_of
 
 from jaxident.diagnosis.causes.columns import tabulate
 from jaxident.diagnosis.causes.discrepancy import unexplained
@@ -59,12 +59,13 @@ def test_a_window_whose_start_would_jump_does_not_stop_the_others(plain):
     np.testing.assert_allclose(np.delete(found, [0, 2], axis=1), np.delete(nominal.starts, [0, 2], axis=1))
 
 
-def test_the_step_of_a_quantised_command_is_found_among_many():
-    for step in (0.05359, 0.17):
-        vector = VECTOR.copy()
-        vector[PLACES["input_quantisation", "step"]] = step
-        found = likely_steps(*nominal_fit(windows_of(vector)))
-        assert abs(found[0] / step - 1.0) < 0.01
+@pytest.mark.parametrize("towards_zero", [0.0, 1.0])
+@pytest.mark.parametrize("step", [0.05359, 0.17])
+def test_the_step_of_a_quantised_command_is_found_among_many(step, towards_zero):
+    vector = robot_with({("input_quantisation", "step"): step, ("input_quantisation", "towards_zero"): towards_zero})
+    found, form = likely_steps(*nominal_fit(windows_of(vector)))[0]
+    assert abs(found / step - 1.0) < 0.01
+    assert form == towards_zero
 
 
 def test_a_payload_is_placed_where_it_came():

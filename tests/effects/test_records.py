@@ -99,7 +99,7 @@ def test_seeds_are_points_of_the_search(name):
     suggested = CATALOGUE[name].search.suggested
     points = seeds(name, 60.0)
     if suggested is not None:
-        points = [*points, suggested.seed(*((0.1, 0.2) if suggested.by == "places" else (0.1,)))]
+        points = [*points, suggested.seed(0.1, 0.2)]
     for point in points:
         assert point.keys() <= own.keys()
         assert all(own[key].low <= value <= own[key].high for key, value in point.items())

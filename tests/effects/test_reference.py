@@ -54,6 +54,18 @@ def test_a_wheel_that_coasts_in_its_play():
     assert np.abs(found - wanted).max() < tolerance(("backlash",))
 
 
+def test_commands_that_are_rounded_towards_zero():
+    law, log = {"step": 0.15, "towards_zero": 1.0}, drive_log()
+    found = full(to_vector([Effect("input_quantisation", law)]), log, substeps=substeps_for(frozenset()))
+    command = np.array(log.u_r), np.array(log.u_l)
+    wanted, nearest = (
+        simulate_reference(PARAMETERS, {"input_quantisation": law | form}, log.t, *command, START, step=1e-3)
+        for form in ({}, {"towards_zero": 0.0})
+    )
+    assert np.abs(nearest - wanted).max() > 1e-2
+    assert np.abs(found - wanted).max() < tolerance(("input_quantisation",))
+
+
 @pytest.mark.parametrize("spin", [0.0, 0.02])
 def test_a_dry_wheel_that_slides(spin):
     law, log = {"limit": 0.5, "dry": 1.0, "spin": spin}, drive_log()

@@ -292,7 +292,8 @@ def sent_commands(effects, u, rng):
         u[row] = mean + difference / 2.0, mean - difference / 2.0
     step = effects.get("input_quantisation", {}).get("step", 0.0)
     if step > 0.0:
-        u = np.round(u / step) * step
+        towards_zero = effects["input_quantisation"].get("towards_zero", 0.0)
+        u = (np.fix(u / step) if towards_zero else np.round(u / step)) * step
     lost = effects.get("lost_commands", {}).get("probability", 0.0)
     for row in range(1, len(u)):
         if rng is not None and lost > 0.0 and rng.random() < lost:

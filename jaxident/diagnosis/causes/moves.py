@@ -130,11 +130,13 @@ def _in_other_form(data: Data, now: Move, pair: tuple[str, str]) -> Move | None:
     that yields came in as a dry one: judging runs were missed by 118 camera variances, and in the right form by 1.1.
     """
     name, key = pair
-    other = 0.0 if now.fit.vector[PLACES[pair]] > 0.5 else 1.0
-    seed = next(each for each in seeds(name, duration=0.0) if each.get(key, 0.0) == other)
+    wanted = 0.0 if now.fit.vector[PLACES[pair]] > 0.5 else 1.0
+    seed = next(each for each in seeds(name, duration=0.0) if each.get(key, 0.0) == wanted)
     shape = {own.name: seed.get(own.name, own.neutral) for own in COORDINATES[name] if own.shape}
     vector = seeded(now.fit.vector, name, shape)
     first = refit(data, vector, now.fit.starts, now.effects, most=FIRST_STEPS)
+    for other in (each for each in REACHED if each[0] == name):
+        first = refit(data, at_best(data, first, other), first.starts, now.effects, most=FIRST_STEPS)
     if first.cost > now.fit.cost + LEAST_BEHIND:
         return None
     return stands(refit(data, first.vector, first.starts, now.effects), now.effects)

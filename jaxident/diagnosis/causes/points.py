@@ -28,7 +28,7 @@ def points_of(name: str, data: Data, solution: Solution) -> list[Seed]:
         return seeds(name, float(data.windows.session[-1] + data.windows.t[-1, -1]))
     if suggested.by == "places":
         return [suggested.seed(*place) for place in _centres(data)]
-    return [suggested.seed(step) for step in likely_steps(data, solution)]
+    return [suggested.seed(*step) for step in likely_steps(data, solution)]
 
 
 def _centres(data: Data) -> list[tuple[float, float]]:

@@ -14,21 +14,33 @@ TEETH = np.arange(2.2, 50.0, 0.08)
 """Steps in the largest command."""
 
 
-def likely_steps(data: Data, solution: Solution, count: int = 16) -> np.ndarray:
-    """The most promising steps (count,), each better than its neighbours, in largest commands."""
+def likely_steps(data: Data, solution: Solution, count: int = 16) -> list[tuple[float, float]]:
+    """The most promising steps, in largest commands, of commands that are rounded to the nearest (0) or towards zero
+    (1), each better than its neighbours."""
     wanted = _slopes(data, solution)
-    slope, square = np.zeros(len(TEETH)), np.zeros(len(TEETH))
+    slope, square = np.zeros((2, len(TEETH))), np.zeros((2, len(TEETH)))
     for wheel, zone in enumerate(solution.vector[6:8]):
         levels, own, rows = np.unique(data.windows.command[..., wheel], return_inverse=True, return_counts=True)
         by_level = np.bincount(own.ravel(), wanted[..., wheel].ravel(), len(levels))
         for k, step in enumerate(1.0 / TEETH):
-            change = past_zone(np.round(levels / step) * step, zone) - past_zone(levels, zone)
-            slope[k] += by_level @ change
-            square[k] += rows @ change**2
+            for form, rounded in enumerate((_to_nearest(levels, step), _towards_zero(levels, step))):
+                change = past_zone(rounded, zone) - past_zone(levels, zone)
+                slope[form, k] += by_level @ change
+                square[form, k] += rows @ change**2
     promise = slope / np.sqrt(square + 1e-12)
-    inside = np.pad(promise, 1, constant_values=-np.inf)
-    peaks = np.flatnonzero((promise >= inside[:-2]) & (promise >= inside[2:]))
-    return 1.0 / TEETH[peaks[np.argsort(-promise[peaks])][:count]]
+    inside = np.pad(promise, ((0, 0), (1, 1)), constant_values=-np.inf)
+    peaks = np.argwhere((promise >= inside[:, :-2]) & (promise >= inside[:, 2:]))
+    best = peaks[np.argsort(-promise[tuple(peaks.T)])][:count]
+    return [(float(1.0 / TEETH[k]), float(form)) for form, k in best]
+
+
+def _to_nearest(levels: Array, step: float) -> np.ndarray:
+    return np.round(levels / step) * step
+
+
+def _towards_zero(levels: Array, step: float) -> np.ndarray:
+    """Half a step more than what rounding towards zero leaves: the fitted dead zones hold the half that is lost."""
+    return (np.trunc(levels / step) + 0.5 * np.sign(levels)) * step
 
 
 def _slopes(data: Data, solution: Solution) -> np.ndarray:
