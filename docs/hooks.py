@@ -30,6 +30,7 @@ COPIED = {
             "robustness.png",
             "efficiency.md",
             "discovered.md",
+            "discovered.png",
             "export_gap.md",
             "speed.md",
             "gpu.md",

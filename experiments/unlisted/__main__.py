@@ -13,7 +13,7 @@ import multiprocessing
 import pathlib
 
 from .measure import line, one, table
-from .page import write
+from .page import picture, write
 from .robots import KINDS
 
 
@@ -27,6 +27,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--out", required=True, type=pathlib.Path)
     parser.add_argument("--page", type=pathlib.Path)
+    parser.add_argument("--picture", type=pathlib.Path)
     options = parser.parse_args()
     rows = json.loads(options.out.read_text()) if options.out.exists() else []
     there = {(row["kind"], row["seed"], row["size"]) for row in rows}
@@ -40,6 +41,8 @@ def main() -> None:
     print(table(rows))
     if options.page is not None:
         write(rows, options.page)
+    if options.picture is not None:
+        picture(rows, options.picture)
 
 
 if __name__ == "__main__":

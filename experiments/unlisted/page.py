@@ -1,6 +1,8 @@
 """A page of what was discovered in robots with hidden effects: a section for each kind, with the first robot's laws."""
 
+import math
 import pathlib
+import textwrap
 
 import numpy as np
 
@@ -21,13 +23,37 @@ ERRORS = ("nominal", "corrected", "known")
 
 def write(rows: list[dict], path: pathlib.Path) -> None:
     """The page of some rows of `experiments.unlisted`."""
-    kinds = [kind for kind in KINDS if any(row["kind"] == kind for row in rows)]
-    sections = [_section(kind, [row for row in rows if row["kind"] == kind]) for kind in kinds]
+    sections = [_section(kind, [row for row in rows if row["kind"] == kind]) for kind in _kinds(rows)]
     write_page(Page("What no catalogue lists", LEAD, sections, f"{len(rows)} robots"), path)
 
 
+def picture(rows: list[dict], path: pathlib.Path) -> None:
+    """One picture of the first law of the first robot of each kind that has one."""
+    first = [next(row for row in sorted(rows, key=_seed) if row["kind"] == kind) for kind in _kinds(rows)]
+    shown = [row for row in first if row["laws"]]
+    lines = math.ceil(len(shown) / 2)
+    figure, axes = plot.figure(lines, 2, size=(11.0, 3.1 * lines))
+    for ax in axes.flat[len(shown) :]:
+        ax.axis("off")
+    for row, ax in zip(shown, axes.flat, strict=False):
+        law = row["laws"][0]
+        plot.discovered(law_of(law), law["rows"], ax=ax)
+        words = textwrap.fill(KINDS[row["kind"]].rstrip("."), 50)
+        ax.set_title(f"{words}\n{100 * achieved(row):.0f} % of the error taken away", fontsize="medium")
+    path.write_bytes(plot.image(figure))
+
+
+def _seed(row: dict) -> int:
+    return row["seed"]
+
+
+def _kinds(rows: list[dict]) -> list[str]:
+    """Kinds that some rows have, in the order of KINDS."""
+    return [kind for kind in KINDS if any(row["kind"] == kind for row in rows)]
+
+
 def _section(kind: str, rows: list[dict]) -> Section:
-    rows = sorted(rows, key=lambda row: row["seed"])
+    rows = sorted(rows, key=_seed)
     cells = [
         (str(row["seed"]), ", ".join(row["named"]) or "nothing", *(f"{row[key]:.3g}" for key in ERRORS),
          f"{100 * achieved(row):.0f} %" if np.isfinite(achieved(row)) else "nothing to take", str(len(row["laws"])))
