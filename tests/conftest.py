@@ -5,6 +5,10 @@ import pathlib
 import tempfile
 from collections.abc import Iterator
 
+# Two workers share the cores: two threads each, that wait for each other, cost a quarter more processor time (tests of
+# the diagnosis's noise, account and fits). Set before NumPy is imported, as the command line does.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import jax
 import pytest
 
