@@ -115,8 +115,7 @@ def diagnose(
     A third of the runs is kept for judging, the second and others two to five apart; of one or two runs, a third of
     their parts. Of a long log at most 16,000 rows fit and 8,000 judge, those whose commands tell most. The gap, its
     account and how far it shrinks come from the rows that judge alone. Effects and discovered laws that the nominal
-    model has are no gap.
-    Needs double precision and about a minute.
+    model has are no gap. Needs double precision and about a minute.
 
     Args:
         logs: the robot's logs, several runs if possible.

@@ -137,9 +137,8 @@ class Transform(NamedTuple):
 
 
 class Suggested(NamedTuple):
-    """Seeds that a log itself suggests. by: what is looked for in it, `places` (x and y, all over the field that poses
-    fill) or `steps` (of commands that are rounded to the nearest, 0, or towards zero, 1, by the residuals). seed: from
-    such a pair to a seed."""
+    """Seeds that a log itself suggests. by: what is looked for in it, `places` (x, y: all over the field that poses
+    fill) or `steps` (of rounded commands, by the residuals; then 0, or 1 if towards zero). seed: from such a pair."""
 
     by: str
     seed: Callable[..., Seed]

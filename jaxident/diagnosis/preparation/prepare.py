@@ -50,8 +50,8 @@ class Prepared(NamedTuple):
     nominal: the nominal fit. lost: the share of commands that never arrived, and the gain of
     saying so; the windows' commands are then those that did, those `sent` (rows of a piece, pieces, 2) are kept.
     told (10,): the coordinates of a nominal model that was given, None without; laws: those in no catalogue that it
-    has, in the user's unit, which every fit obeys. served: rows that fit, and rows that
-    judge; of a long log they are not all (`roles`).
+    has, in the user's unit, which every fit obeys. served: rows that fit, and rows that judge; of a long log they are
+    not all (`roles`).
     """
 
     log: Log
@@ -209,8 +209,11 @@ def without_outliers(
 def without_rows(
     log: Log, rows: Array, windows: Windows, fit: Solution, pieces: list[Piece]
 ) -> tuple[Windows, Solution]:
-    """Windows, and the nominal fit there, without the poses of some rows."""
+    """Windows, and the nominal fit there, without the poses of some rows. Laws go with them: each window is one of
+    those before, some of which may be gone."""
     found = stretches(blind(log, rows), len(windows.step), pieces)
-    same = take(windows, np.searchsorted(windows.row, found.row))
-    found = found._replace(laws=same.laws)
+    if windows.laws is not None:
+        order = np.argsort(windows.row)
+        same = order[np.searchsorted(windows.row, found.row, sorter=order)]
+        found = found._replace(laws=take(windows, same).laws)
     return found, rough_fit(found, fit.vector)

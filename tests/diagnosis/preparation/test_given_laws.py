@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import jaxident as ji
-from jaxident.diagnosis.motion.windows import take
-from jaxident.diagnosis.preparation.prepare import prepare
+from jaxident.diagnosis.motion.windows import Piece, take
+from jaxident.diagnosis.preparation.prepare import prepare, without_rows
 from jaxident.effects.law_arrays import acting, joined, laws_of
 from jaxident.log import join, make_log
 from jaxident.robot.drive import Physical
@@ -66,6 +66,21 @@ def test_a_laws_phase_goes_with_its_window():
     assert np.ptp(windows.laws.phase[0]) > 0.0
     some = take(windows, np.array([5, 1]))
     np.testing.assert_array_equal(some.laws.phase, windows.laws.phase[:, [5, 1]])
+
+
+def test_windows_keep_their_phases_where_outliers_are_left_out():
+    logs = runs_of(dataclasses.replace(ROBOT, discovered=(NOT_ROUND,)), 3)
+    whole = prepare(logs, None, laws=(NOT_ROUND,))
+    windows = take(whole.windows, np.arange(len(whole.windows.run))[::-1])  # in any order
+    rows = np.zeros(len(logs.t), bool)
+    rows[windows.row[0] : windows.row[0] + len(windows.step)] = True  # a window that is gone then
+    log = whole.log._replace(u_r=whole.log.u_r / whole.largest, u_l=whole.log.u_l / whole.largest)
+    pieces = [Piece(run, 0, 0, ROWS) for run in np.unique(log.run[windows.row])]
+    found, _ = without_rows(log, rows, windows, whole.nominal, pieces)
+    before = dict(zip(windows.row.tolist(), windows.laws.phase[0].tolist(), strict=True))
+    kept = [before[row] for row in found.row.tolist()]
+    assert len(kept) == len(before) - 1
+    np.testing.assert_array_equal(found.laws.phase[0], kept)
 
 
 @pytest.mark.slow
