@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -33,7 +34,10 @@ GROUPS = {
     "gears": (("input_quantisation", "input_rate_limit", "backlash", "slope", "payload_change", "camera_tilt"), 2e-4),
     "rub": (("coulomb_friction", "stiction"), SHARP),
     "grip": (("traction_limit",), SMOOTH),
+    "casts": (("input_quantisation",), SMOOTH),
 }  # fmt: skip
+CASTS = {"input_quantisation": {"towards_zero": 1.0}}
+"""Forms of the effects of the last group."""
 
 
 def commands(rows=ROWS, seed=0) -> np.ndarray:
@@ -47,8 +51,8 @@ def simulated(model, u) -> np.ndarray:
     return np.stack([np.asarray(column) for column in ji.simulate(model, log).pose], axis=1)[1:]
 
 
-def robot(names) -> Model:
-    sizes = {name: CATALOGUE[name].typical(ROWS * PERIOD) for name in names}
+def robot(names, forms=MappingProxyType({})) -> Model:
+    sizes = {name: CATALOGUE[name].typical(ROWS * PERIOD) | forms.get(name, {}) for name in names}
     if "direction_gain" in sizes:
         sizes["direction_gain"] = {"right": -0.08, "left": 0.05}  # a negative number within statements
     return with_effects(PLAIN, sizes.items())
@@ -63,7 +67,7 @@ def test_the_groups_hold_every_effect_that_has_statements():
 @pytest.mark.parametrize("group", GROUPS)
 def test_programs_move_as_the_simulator(group, tmp_path):
     names, bound = GROUPS[group]
-    model, u = robot(names), commands()
+    model, u = robot(names, CASTS if group == "casts" else {}), commands()
     own = python_poses(python.write(model, model.effects), u)
     wanted = simulated(model, u)
     assert np.abs(own - wanted).max() < bound
