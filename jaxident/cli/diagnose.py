@@ -44,7 +44,7 @@ class SeveralPerOption(Recorded):
 @click.command("diagnose", cls=SeveralPerOption)
 @click.argument("logs", nargs=-1, required=True, metavar="LOG...")
 @click.option("--sim", multiple=True, metavar="LOG...", help="Logs of your own simulator, after those of the robot.")
-@click.option("--model", metavar="MODEL", help="Judge this model, with its effects, instead of one fitted to the logs.")
+@click.option("--model", metavar="MODEL", help="Judge this model, with its effects and laws, in place of a fitted one.")
 @click.option("--horizon", type=above_zero, metavar="S", help="How many seconds ahead errors are judged (default: 1).")
 @click.option("--out", default="diagnosis", show_default=True, metavar="DIR", help="The folder to write.")
 @columns_option
