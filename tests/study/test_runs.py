@@ -51,6 +51,7 @@ def test_effects_go_on_from_run_to_run():
     assert away[2] > 1e-3
 
 
+@pytest.mark.slow  # the four methods take a minute to compile
 def test_every_method_sees_all_runs_and_no_seam(tmp_path):
     """Runs begin at the origin: a seam taken for motion would throw an estimate away by metres."""
     methods = ("batch", "recursive", "key-term-least-squares", "maximum-likelihood")

@@ -9,7 +9,7 @@ from jaxident.diagnosis.fit.nominal import rough_fit
 from jaxident.diagnosis.fit.refit import Solution
 from jaxident.diagnosis.laws.wheel_angle import parts_of
 from jaxident.diagnosis.motion.linear import follow, without_starts
-from jaxident.diagnosis.motion.windows import Windows
+from jaxident.diagnosis.motion.windows import Windows, take
 from jaxident.diagnosis.noise.law import Law, first_law, white_whitener
 from jaxident.effects.coordinates import NOMINAL, neutral_vector
 from jaxident.effects.law_arrays import laws_of
@@ -37,6 +37,15 @@ def obeying_given(
     if of_wheels := [k for k, own in enumerate(laws) if own.signal == ANGLE]:
         windows, vector = _turned(windows, of_wheels, rough_fit(plain, vector, law), law)
     return windows, rough_fit(windows, neutral_vector(vector[: len(NOMINAL)]), law)
+
+
+def obeying_as(windows: Windows, some: Windows) -> Windows:
+    """Some of the windows, cut anew, that obey the laws which these obey, each at its phases."""
+    if windows.laws is None:
+        return some
+    order = np.argsort(windows.row)
+    same = order[np.searchsorted(windows.row, some.row, sorter=order)]
+    return some._replace(laws=take(windows, same).laws)
 
 
 def _turned(windows: Windows, of_wheels: Sequence[int], fit: Solution, law: Law | None) -> tuple[Windows, Array]:

@@ -10,7 +10,7 @@ from jaxident.diagnosis.fit.refit import Solution
 from jaxident.diagnosis.motion.windows import Piece, Windows, cut, take
 from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.preparation.dropped_commands import Lost
-from jaxident.diagnosis.preparation.given_laws import obeying_given
+from jaxident.diagnosis.preparation.given_laws import obeying_as, obeying_given
 from jaxident.diagnosis.preparation.pose_screening import (
     Frames,
     find_more_outliers,
@@ -209,11 +209,6 @@ def without_outliers(
 def without_rows(
     log: Log, rows: Array, windows: Windows, fit: Solution, pieces: list[Piece]
 ) -> tuple[Windows, Solution]:
-    """Windows, and the nominal fit there, without the poses of some rows. Laws go with them: each window is one of
-    those before, some of which may be gone."""
-    found = stretches(blind(log, rows), len(windows.step), pieces)
-    if windows.laws is not None:
-        order = np.argsort(windows.row)
-        same = order[np.searchsorted(windows.row, found.row, sorter=order)]
-        found = found._replace(laws=take(windows, same).laws)
+    """Windows, and the nominal fit there, without the poses of some rows."""
+    found = obeying_as(windows, stretches(blind(log, rows), len(windows.step), pieces))
     return found, rough_fit(found, fit.vector)
