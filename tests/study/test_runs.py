@@ -71,6 +71,7 @@ def test_every_method_sees_all_runs_and_no_seam(tmp_path):
     assert float(best.max()) < 5.0
 
 
+@pytest.mark.slow
 def test_the_bound_is_that_of_all_runs(monkeypatch):
     monkeypatch.setattr(bound, "SEEDS", 1)
     found = bound.bounds(THREE).squeeze()

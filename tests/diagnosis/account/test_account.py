@@ -149,6 +149,7 @@ def test_a_memory_of_the_camera_is_told_with_what_it_does_to_starts():
     assert np.mean(judged.squares[0]) > 1.5 * np.mean(calm.squares[0])  # else the test would see no difference
 
 
+@pytest.mark.slow
 def test_what_noise_happens_to_leave_spreads_as_over_seeds():
     """The spread of mean squares over twelve seeds of two runs, 18 starts each, has a standard error of 20 %."""
     law, _ = LAWS["slipping"]

@@ -43,6 +43,7 @@ def trials(kind, count=next_run.TOGETHER):
     return np.stack([make(rng, kind, SAMPLES, 12) for _ in range(count)])
 
 
+@pytest.mark.slow
 def test_a_plan_keeps_the_limit_and_its_seed(robot):
     found = plan(robot, PAIR, samples=SAMPLES, limit=0.7, batches=2)
     again = plan(robot, PAIR, samples=SAMPLES, limit=0.7, batches=2)

@@ -182,6 +182,7 @@ def test_predictions_that_are_not_finite_are_counted_and_in_no_mean():
     assert told["position_median"] is None
 
 
+@pytest.mark.slow
 def test_commands_that_may_be_lost_are_predicted_as_they_are_to_be_expected():
     """400 robots under the same commands, each losing others: their mean path is the predicted one, and their spread is
     the deviation, within its standard error of 3.5 % and a tenth for jolts that last longer than a row."""

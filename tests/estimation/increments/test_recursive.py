@@ -132,6 +132,7 @@ def test_vmap_over_seeds_equals_a_loop():
             np.testing.assert_allclose(many[k], one, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_forgetting_follows_a_gain_that_falls():
     samples = 3000
     command = multilevel(jax.random.key(3), samples, 1.0, 10)
