@@ -47,7 +47,7 @@ def _rounded(name: str, value: str, step: str) -> str:
     return f"{name} = pick({step} > 0.0, round_even({value} / pick({step} > 0.0, {step}, 1.0)) * {step}, {value})"
 
 
-def _in_steps(s: str) -> tuple[str, ...]:
+def _quantised(s: str) -> tuple[str, ...]:
     """A command rounded to the nearest step, or towards zero."""
     return (
         f"a = u_{s} / pick({{step}} > 0.0, {{step}}, 1.0)",
@@ -57,7 +57,7 @@ def _in_steps(s: str) -> tuple[str, ...]:
 
 
 SATURATION = Step(_wheels(lambda s: f"u_{s} = clip(u_{s}, -{{level}}, {{level}})"))
-QUANTISATION = Step((*_in_steps("r"), *_in_steps("l")))
+QUANTISATION = Step((*_quantised("r"), *_quantised("l")))
 TWIST = Step((
     _rounded("a", "(0.5 * (u_r + u_l))", "{mean}"),
     _rounded("b", "(u_r - u_l)", "{difference}"),

@@ -135,8 +135,6 @@ def _in_other_form(data: Data, now: Move, pair: tuple[str, str]) -> Move | None:
     shape = {own.name: seed.get(own.name, own.neutral) for own in COORDINATES[name] if own.shape}
     vector = seeded(now.fit.vector, name, shape)
     first = refit(data, vector, now.fit.starts, now.effects, most=FIRST_STEPS)
-    for other in (each for each in REACHED if each[0] == name):
-        first = refit(data, at_best(data, first, other), first.starts, now.effects, most=FIRST_STEPS)
     if first.cost > now.fit.cost + LEAST_BEHIND:
         return None
     return stands(refit(data, first.vector, first.starts, now.effects), now.effects)
