@@ -19,6 +19,10 @@ import jax
 import jax.export
 import jaxlib
 
+FEW = 64
+"""Counts up to which `roomy` keeps two binary digits, so that few programs serve all short logs; beyond it keeps four:
+there a program takes longer to run than to compile. Where a log of another length asks for new programs, `identify`
+takes TIMED s on two cores and `diagnose` TIMED, otherwise TIMED and TIMED. No other numbers were tried."""
 DIGEST = hashlib.sha256().digest_size
 _named: set[type] = set()
 
@@ -62,6 +66,13 @@ def kept_program(*tuples: type, static: tuple[str, ...] = ()) -> Callable[[Calla
         return call
 
     return wrap
+
+
+def roomy(count: int) -> int:
+    """The count that a program is compiled for where `count` are needed: 1, 2, 3, 4, 6, 8, 12, ... up to FEW, by which
+    at most half is added, beyond at most an eighth."""
+    grain = 1 << max(count.bit_length() - (2 if count <= FEW else 4), 0)
+    return -(-count // grain) * grain
 
 
 def _shape(leaf: Any) -> tuple:

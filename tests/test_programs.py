@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import pytest
 
 from jaxident import programs
-from jaxident.programs import kept_program
+from jaxident.programs import FEW, kept_program, roomy
 
 
 class Pair(NamedTuple):
@@ -110,3 +110,22 @@ def test_within_another_program_it_is_a_plain_function(folder):
     assert many.tolist() == (jnp.arange(6.0).reshape(3, 2) ** 3 + 1.0).tolist()
     assert slope.tolist() == [3.0, 12.0]
     assert not list(folder.glob("program-*"))
+
+
+def test_counts_have_room_for_more():
+    assert [roomy(count) for count in (0, 1, 2, 3, 4, 5, 7, 9, 13, 24, 25, 64)] == [
+        0,
+        1,
+        2,
+        3,
+        4,
+        6,
+        8,
+        12,
+        16,
+        24,
+        32,
+        64,
+    ]
+    for count in range(1, 40 * FEW):
+        assert count <= roomy(count) == roomy(roomy(count)) <= (1.5 if count <= FEW else 1.125) * count

@@ -12,7 +12,7 @@ from jaxident.estimation.poses.maximum_likelihood import Fit, uncertain_as_by
 from jaxident.estimation.poses.noise_law import WHITE, colour, fit_law
 from jaxident.estimation.poses.parameters import Law, names, to_vector
 from jaxident.estimation.poses.prior import RATE, from_prior
-from jaxident.estimation.poses.runs import Runs, pad_rows, stack_runs, with_wheels
+from jaxident.estimation.poses.runs import Runs, stack_runs, with_room, with_wheels
 from jaxident.estimation.poses.wheel_colour import WHITE_WHEELS, spacing, thinned, wheel_colour
 from jaxident.estimation.suspicions.log_suspicions import log_suspicions, odometry_suspicions
 from jaxident.estimation.uncertainty.precision import difference_covariance, spread_of
@@ -50,9 +50,10 @@ def identify_poses(log: Log, d_max: float, noise_law: str, coupling: bool) -> Po
     log = _with_commands(log)
     runs = stack_runs(log)
     runs = runs if log.wheel_r is None else with_wheels(runs, log)
-    fit, law, doubts = _fitted(pad_rows(runs), d_max, noise_law, coupling)
-    rows = runs.seen.shape[1]
-    fit = fit._replace(innovations=jax.tree.map(lambda part: part[..., :rows], fit.innovations))
+    fit, law, doubts = _fitted(with_room(runs), d_max, noise_law, coupling)
+    count, rows = runs.seen.shape
+    own = jax.tree.map(lambda part: part[:count, ..., :rows], fit.innovations)
+    fit = fit._replace(innovations=own, starts=fit.starts[:count])
     if not all(np.all(np.isfinite(leaf)) for leaf in jax.tree.leaves((fit.robot, fit.covariance))):
         raise WorkError("the maximum-likelihood estimate is not finite: the log does not determine the model")
     doubts = (*_suspicions(fit, law, runs, noise_law), *doubts, *log_suspicions(log))

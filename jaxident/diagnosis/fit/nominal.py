@@ -25,7 +25,7 @@ from jaxident.errors import InputError
 from jaxident.estimation.poses.maximum_likelihood import begin
 from jaxident.estimation.poses.noise_law import CLEAR
 from jaxident.estimation.poses.prior import SIGNS, coasting
-from jaxident.estimation.poses.runs import pad_rows, stack_runs
+from jaxident.estimation.poses.runs import stack_runs, with_room
 from jaxident.log import Log, join
 from jaxident.robot.drive import Physical
 
@@ -43,7 +43,7 @@ def starting_point(log: Log, pieces: list[Piece]) -> np.ndarray:
     """The nominal coordinates (10,) that the starter of the likelihood finds in some pieces."""
     runs = log.runs()
     own = join([runs[piece.run].rows(piece.first, piece.last) for piece in pieces])
-    found = begin(jax.tree.map(jnp.asarray, pad_rows(stack_runs(own))), jnp.asarray(0.9)).estimate
+    found = begin(jax.tree.map(jnp.asarray, with_room(stack_runs(own))), jnp.asarray(0.9)).estimate
     drive = Physical(np.asarray(found.rate), np.asarray(found.gain))
     point = nominal_vector(drive, np.asarray(found.dead_zone))
     if not np.all(np.isfinite(point)) or abs(np.linalg.det(np.asarray(found.gain))) < 1e-9:

@@ -16,7 +16,7 @@ from jaxident.diagnosis.laws.kinds import Kind
 from jaxident.diagnosis.motion.linear import motion_of
 from jaxident.diagnosis.motion.paths import left_behind
 from jaxident.diagnosis.motion.responses import Responses
-from jaxident.diagnosis.motion.windows import Windows
+from jaxident.diagnosis.motion.windows import Windows, with_room
 from jaxident.effects.law_kinds import (
     AHEAD,
     ALONG,
@@ -92,7 +92,8 @@ def path_of(fit: Solution, windows: Windows) -> Path:
     x, y, theta, v, w, push = (np.asarray(part) for part in motion)
     rates, gain = np.exp(fit.vector[:2]), fit.vector[2:6].reshape(2, 2)
     speeds = np.stack([rates[0] * v, rates[1] * w], axis=-1) @ np.linalg.pinv(gain).T
-    step, past = np.asarray(windows.step).T, _left_behind(windows._replace(laws=None))
+    step, past = np.asarray(windows.step).T, _left_behind(with_room(windows._replace(laws=None)))
+    past = jax.tree.map(lambda part: part[..., : len(step)], past)
     begin = windows.session[windows.run] + windows.t[windows.first, windows.run]
     time = begin[:, None] + np.cumsum(step, axis=1) - step
     heading = (theta + np.pi) % (2.0 * np.pi) - np.pi

@@ -13,7 +13,7 @@ import numpy as np
 
 from jaxident.array_types import Array, Wheels
 from jaxident.diagnosis.motion.paths import push_of
-from jaxident.diagnosis.motion.windows import Windows
+from jaxident.diagnosis.motion.windows import Windows, filled_up, with_room
 from jaxident.effects.coordinates import BY_DRIVE, NOMINAL, PLACES, neutral_vector
 from jaxident.effects.fast_input import PUSHING, REMEMBERING, Push
 from jaxident.parallel import in_parallel
@@ -45,17 +45,21 @@ def each_of(program: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def run_each(several: Callable[..., Any], vectors: Array, starts: Array, windows: Windows) -> Any:
-    """Results (batch, ...) of a program that `each_of` made, at vectors (batch, SIZE) and starts (batch, 5, windows).
+    """Results (batch, rows, windows, ...) of a program that `each_of` made, at vectors (batch, SIZE) and starts (batch,
+    5, windows).
 
-    The last vector fills up the last call, so that there is one program for any number of vectors.
+    The last vector fills up the last call, and windows have room for more, so that one program serves many numbers of
+    both.
     """
-    windows, count = jax.tree.map(jnp.asarray, windows), len(vectors)
+    count, own = len(vectors), len(windows.run)
+    windows = jax.tree.map(jnp.asarray, with_room(windows))
+    starts = filled_up(starts)
     push = pushes_of(vectors, windows)
     size = AT_ONCE if len(windows.run) <= FEW_WINDOWS else 1
     blocks = [np.minimum(np.arange(k, k + size), count - 1) for k in range(0, count, size)]
     lanes = [(vectors[block], starts[block], [push[k] for k in block], windows) for block in blocks]
     found = in_parallel(several, lanes, ahead=False)
-    return jax.tree.map(lambda *parts: np.concatenate(parts)[:count], *found)
+    return jax.tree.map(lambda *parts: np.concatenate(parts)[:count, :, :own], *found)
 
 
 def pushes_of(vectors: Array, windows: Windows) -> list[Push]:

@@ -16,7 +16,7 @@ from jaxident.diagnosis.motion.driving import each_of, pushes_of, run_each
 from jaxident.diagnosis.motion.paths import move, residuals
 from jaxident.diagnosis.motion.responses import answer_to_start
 from jaxident.diagnosis.motion.rims import rim_speeds
-from jaxident.diagnosis.motion.windows import Windows
+from jaxident.diagnosis.motion.windows import Windows, filled_up, with_room
 from jaxident.effects.coordinates import limits, sizes
 from jaxident.effects.fast_input import Push
 from jaxident.effects.law_arrays import Laws
@@ -89,10 +89,11 @@ def _of_rims(vectors: Array, lanes: Array, windows: Windows, step: Array) -> Lin
 
 def motion_of(vector: Array, starts: Array, windows: Windows) -> list[np.ndarray]:
     """x, y, heading, v, w (windows, rows) at each row, and the mean pushes from there on (windows, rows, 2)."""
-    windows = jax.tree.map(jnp.asarray, windows)
+    own, windows = len(windows.run), jax.tree.map(jnp.asarray, with_room(windows))
+    starts = filled_up(starts)
     (push,) = pushes_of(vector[None], windows)
-    states = [np.asarray(part).T for part in _tracked(vector, starts, push, windows)]
-    return [*states, np.asarray(push.mean).mean(axis=1).transpose(2, 0, 1)]
+    states = [np.asarray(part).T[:own] for part in _tracked(vector, starts, push, windows)]
+    return [*states, np.asarray(push.mean).mean(axis=1).transpose(2, 0, 1)[:own]]
 
 
 def gram(whitener: Array, columns: Array, starts: Array, more: Array | None = None) -> Gram:

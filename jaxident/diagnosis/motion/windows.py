@@ -9,11 +9,14 @@ from jaxident.array_types import Array
 from jaxident.estimation.poses.runs import stack_runs
 from jaxident.estimation.poses.ways import ways
 from jaxident.log import Log, join, run_begins
+from jaxident.programs import roomy
 
 SMALLEST = 8
 """Poses that a window needs: fewer say nothing beyond its start state."""
 FREE = np.full(4, np.nan)
 """Of windows in which nothing is held."""
+ROWS = 64
+"""Rows that room for pieces comes in. No other number was tried."""
 
 
 class Windows(NamedTuple):
@@ -116,6 +119,28 @@ def uncut(commands: Array, period: float) -> Windows:
         pose=np.zeros((*t.shape, 3)), seen=np.ones(t.shape, bool), run=np.arange(count),
         first=np.zeros(count, int), row=np.zeros(count, int), way=np.zeros((2, count)),
     )  # fmt: skip
+
+
+def with_room(windows: Windows) -> Windows:
+    """The windows with copies of the last one behind them, and pieces with rows that go on as the last one and copies
+    of the last piece behind: one program then serves logs of many lengths (`roomy`)."""
+    rows, pieces = windows.t.shape
+    row, piece = _filling(rows, ROWS), _filling(pieces)
+    beyond = np.maximum(np.arange(len(row)) - (rows - 1), 0)[:, None]
+    t = windows.t[row] + beyond * (windows.t[-1] - windows.t[-2])
+    return take(windows, _filling(len(windows.run)))._replace(
+        t=t[:, piece], session=windows.session[piece], command=windows.command[row][:, piece]
+    )
+
+
+def filled_up(starts: Array) -> np.ndarray:
+    """Start states (..., windows) of windows that got room."""
+    return np.take(starts, _filling(np.shape(starts)[-1]), axis=-1)
+
+
+def _filling(count: int, unit: int = 1) -> np.ndarray:
+    """Places of the first `count`, then the last one again."""
+    return np.minimum(np.arange(unit * roomy(-(-count // unit))), count - 1)
 
 
 def take(windows: Windows, chosen: Array) -> Windows:

@@ -127,7 +127,8 @@ def uncertain_as_by(fit: Fit, runs: Runs, law: Law) -> Fit:
 def _regular(search: Search, covariance: Array, runs: Runs) -> Array:
     """Whether everything is finite and there are more numbers than unknowns."""
     finite = [jnp.all(jnp.isfinite(part)) for part in (*search.point, search.local.value, covariance)]
-    unknowns = search.point.shared.size + search.point.starts.size
+    with_a_pose = jnp.sum(jnp.any(runs.seen, axis=1))
+    unknowns = search.point.shared.size + search.point.starts.shape[1] * with_a_pose
     return jnp.all(jnp.stack(finite)) & (3 * jnp.sum(runs.seen) > unknowns)
 
 

@@ -8,11 +8,13 @@ import numpy as np
 
 from jaxident.array_types import Array, Pose, Rows, Wheels
 from jaxident.log import Log
+from jaxident.programs import roomy
 
 WINDOW = 200
 """Rows of the windows that the starter fits: long enough for a slow pole, too short for slip to pile up."""
-EIGHTH = 3
-"""Binary digits after the first one that lengths of long runs keep: padding adds an eighth at most."""
+SHORT = 25
+"""Rows that padding of many short runs comes in: 402 of a Husky's of 40 rows, padded to windows, took four times as
+long."""
 MANY = 8
 """Runs from which on padding of short ones costs more than a program of their own. No other number was tried."""
 SAME_STEP = 1e-6
@@ -73,25 +75,21 @@ def with_wheels(runs: Runs, log: Log) -> Runs:
     return runs._replace(wheels=wheels, turning=turning)
 
 
-def pad_rows(runs: Runs) -> Runs:
-    """The runs (NumPy arrays) with rows that nothing was measured in behind them, up to whole windows or, of many, to
-    the next eighth of a power of two of them. Programs are compiled for a shape: so one serves logs of many lengths.
-    Many short runs are padded to an eighth of a window: 402 of a Husky's of 40 rows had 200 each, at four times the
-    cost."""
+def with_room(runs: Runs) -> Runs:
+    """The runs (NumPy arrays) with rows behind them in which nothing was measured, and with runs without a pose: one
+    program then serves logs of many lengths (`roomy`). Rows come in whole windows, of many short runs in fewer."""
     count, rows = runs.seen.shape
-    windows = -(-rows // WINDOW)
-    short = count > MANY and rows <= WINDOW
-    grain = WINDOW >> EIGHTH if short else WINDOW << max(0, windows.bit_length() - 1 - EIGHTH)
-    more = -rows % grain
+    unit = SHORT if count > MANY and rows <= WINDOW else WINDOW
+    more = roomy(count) - count, unit * roomy(-(-rows // unit)) - rows
 
     def padded(column: Array) -> np.ndarray:
         if np.ndim(column) == 0:
             return np.asarray(column)
-        return np.pad(column, ((0, 0), (0, more)))
+        return np.pad(column, ((0, more[0]), (0, more[1])))
 
     step = padded(runs.step)
     if np.ndim(step):
-        step[:, rows:] = np.mean(runs.step)
+        step[:, rows:] = step[count:] = np.mean(runs.step)
     return jax.tree.map(padded, runs)._replace(step=step)
 
 

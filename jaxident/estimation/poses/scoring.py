@@ -63,7 +63,8 @@ def eliminate(local: Local, damping: Damping, held: Array) -> tuple[UnknownsMatr
     own = jnp.full(len(held), damping.others).at[DEAD_ZONES].set(damping.dead_zones)
     shared = shared + jnp.diag(own * jnp.diagonal(shared))
     diagonal = jnp.diagonal(local.starts, axis1=1, axis2=2)
-    own = damping.others * diagonal + 1e-12 * jnp.max(diagonal, axis=1, keepdims=True)
+    largest = jnp.max(diagonal, axis=1, keepdims=True)
+    own = damping.others * diagonal + jnp.where(largest > 0.0, 1e-12 * largest, 1.0)  # a run without a pose stays
     starts = local.starts + jax.vmap(jnp.diag)(own)
     between = local.between * free[:, None]
     right = jnp.concatenate([between.transpose(0, 2, 1), local.gradient.starts[:, :, None]], axis=2)

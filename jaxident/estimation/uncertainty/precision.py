@@ -13,7 +13,7 @@ from jaxident.errors import InputError
 from jaxident.estimation.poses.covariance import covariance_at
 from jaxident.estimation.poses.curvature import Point, local_at
 from jaxident.estimation.poses.parameters import Law, Robot, from_vector, names, to_vector
-from jaxident.estimation.poses.runs import Runs, pad_rows, run_axes, stack_runs, with_wheels
+from jaxident.estimation.poses.runs import Runs, run_axes, stack_runs, with_room, with_wheels
 from jaxident.estimation.uncertainty.verdict import Verdict, verdicts_of
 from jaxident.log import Log, join
 from jaxident.numerics import require_float64
@@ -88,7 +88,7 @@ def cramer_rao(model: Model, inputs: Log | Sequence[Log], noise: Noise, *, start
     runs = _with_planned_wheels(model, runs, log)
     law = law_of(drive, noise, wheels=runs.wheels is not None)
     vector = to_vector(Robot(drive, model.dead_zone, noise, model.wheels), law)
-    covariance = bound_covariance(vector, jnp.stack([jnp.asarray(s, float) for s in start]), pad_rows(runs), law)
+    covariance = bound_covariance(vector, jnp.stack([jnp.asarray(s, float) for s in start]), with_room(runs), law)
     difference = difference_covariance(vector, covariance, model.sample_period, law)
     largest = max(float(np.max(np.abs(u))) for u in runs.command)
     values = natural_values(from_vector(vector, law), law)

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from support.small_robot import VECTOR, windows_of
 
-from jaxident.diagnosis.motion.driving import AT_ONCE, FEW_WINDOWS, pushes_of
+from jaxident.diagnosis.motion.driving import AT_ONCE, FEW_WINDOWS, _pushed, pushes_of
+from jaxident.diagnosis.motion.linear import _residuals as _many
 from jaxident.diagnosis.motion.linear import follow
 from jaxident.diagnosis.motion.paths import push_of, residuals, rolled
 from jaxident.diagnosis.motion.rims import rim_speeds
@@ -62,3 +63,13 @@ def test_an_effect_that_no_vector_has_is_left_out_and_changes_nothing(windows, n
             np.testing.assert_allclose(part, other, atol=1e-9 * max(largest, 1.0))
     plain, moved = (np.asarray(push.mean) for push in pushes_of(vectors, windows))
     assert np.any(plain != moved) == (name in (*REMEMBERING, "transport_delay"))
+
+
+def test_logs_of_other_lengths_run_through_the_same_programs(windows):
+    compiled = []
+    for count in (12, 9, 10):
+        few = take(windows, np.arange(count))
+        few = few._replace(t=few.t[: 320 - count], command=few.command[: 320 - count])
+        assert follow(VECTOR[None], starts_of(1, few), few).shape[1] == count
+        compiled.append((_many._cache_size(), _pushed._cache_size()))
+    assert len(set(compiled)) == 1

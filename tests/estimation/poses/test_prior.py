@@ -23,7 +23,7 @@ from jaxident.estimation.poses.prior import (
     prior_of,
     prior_terms,
 )
-from jaxident.estimation.poses.runs import Runs, pad_rows, stack_runs
+from jaxident.estimation.poses.runs import Runs, stack_runs, with_room
 from jaxident.estimation.uncertainty.precision import natural_values
 from jaxident.estimation.uncertainty.verdict import verdicts
 from jaxident.log import Log, join, make_log
@@ -51,7 +51,7 @@ def runs_of(key, command):
 
 def fitted(runs):
     """The fit as `identify` makes it, in programs that other tests have compiled: a lone `jit` would be one more."""
-    return fit_runs(pad_rows(jax.tree.map(np.asarray, runs)), 0.9)
+    return fit_runs(with_room(jax.tree.map(np.asarray, runs)), 0.9)
 
 
 def straight(rows=200, seed=1):
@@ -145,7 +145,7 @@ def test_what_hardly_shows_is_arrived_at_in_any_unit():
     fits = []
     for seed, unit in itertools.product((1, 2, 3), np.logspace(-3.0, 3.0, 9)):
         log = straight(seed=seed)
-        runs, d_max = pad_rows(stack_runs(log._replace(u_r=unit * log.u_r, u_l=unit * log.u_l))), float(0.72 * unit)
+        runs, d_max = with_room(stack_runs(log._replace(u_r=unit * log.u_r, u_l=unit * log.u_l))), float(0.72 * unit)
         fits.append(fit_from(begin(runs, d_max), runs, d_max, Law(), prior_of(runs)))
     assert sum(bool(fit.ok) for fit in fits) >= 25
     assert np.mean([fit.steps for fit in fits]) < 30
