@@ -20,9 +20,9 @@ import jax.export
 import jaxlib
 
 FEW = 64
-"""Counts up to which `roomy` keeps two binary digits, so that few programs serve all short logs; beyond it keeps four:
-there a program takes longer to run than to compile. Where a log of another length asks for new programs, `identify`
-takes TIMED s on two cores and `diagnose` TIMED, otherwise TIMED and TIMED. No other numbers were tried."""
+"""Counts up to which `roomy` keeps two binary digits, so that few programs serve all short logs; beyond it keeps four,
+for there a program runs longer than it compiles. Of three runs of 600 to 720 rows, a log that needs new programs took
+`identify` 35 s and `diagnose` 20 s on two cores, one that finds them 3 and 9 s. No other numbers were tried."""
 DIGEST = hashlib.sha256().digest_size
 _named: set[type] = set()
 

@@ -69,6 +69,10 @@ def _pair(unit: str, size: float, typical: float, **more) -> tuple[Parameter, Pa
     )
 
 
+def _levels(_: float) -> list[dict[str, float]]:
+    return [{"level": level, "soft": soft} for soft in (0.0, 1.0) for level in (0.9, 0.75, 0.6, 0.45, 0.3)]
+
+
 def _steps(_: float) -> list[dict[str, float]]:
     return [_in_steps(float(step), form) for form in (0.0, 1.0) for step in np.geomspace(0.02, 0.4, 96)]
 
@@ -112,14 +116,17 @@ RECORDS = (
     EffectRecord(
         name="input_saturation", site="actuation", stage="command", step=statements.SATURATION, quantity="saturation",
         words="commands beyond a level have no further effect",
-        equation="u -> clip(u, -s, s)",
+        equation="u -> clip(u, -s, s), or s tanh(u / s)",
         kinds=(("push of each wheel", "1", "own push"),),
         source="Franklin, Powell, Emami-Naeini, Feedback Control, ch. 9",
-        parameters=(Parameter("level", UNIT, float("inf"), (0.3, 1.0), 0.6, least=0.0, above=True),),
+        parameters=(Parameter("level", UNIT, float("inf"), (0.3, 1.0), 0.6, least=0.0, above=True),
+                    Parameter("soft", "", 0.0, (0.0, 1.0), 0.0, least=0.0, most=1.0, shape=True,
+                              forms=("cut off at the level", "bent towards the level"))),
         channels=BOTH,
         act=input_saturation, rank=1, smooth=False, grid=(0.95, 0.9, 0.8, 0.7, 0.6, 0.5),
-        search=Search((Coordinate("level", OFF, 0.05, OFF, 0.5),), all_or_nothing=True,
-                      seeds=lambda _: [{"level": level} for level in (0.9, 0.75, 0.6, 0.45, 0.3)]),
+        search=Search((Coordinate("level", OFF, 0.05, OFF, 0.5),
+                       Coordinate("soft", 0.0, 0.0, 1.0, 1.0, shape=True, stepped=True)), all_or_nothing=True,
+                      seeds=_levels),
     ),
     EffectRecord(
         name="input_quantisation", site="actuation", stage="command", step=statements.QUANTISATION,

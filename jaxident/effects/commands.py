@@ -10,6 +10,8 @@ from jaxident.numerics import safe_divide
 
 JUST = 1e-6
 """Part of a polling period by which a command that comes to a poll may be late: rounding must not cost a period."""
+FAR = 1e9
+"""A saturation level beyond all commands, where there is none."""
 
 
 def lost_commands(u: Wheels, keys, probability: Array) -> Wheels:
@@ -25,9 +27,10 @@ def held(command: Array, lost: Array) -> Array:
     return command[jax.lax.cummax(jnp.where(lost, 0, rows))]
 
 
-def input_saturation(u: Wheels, level: Array) -> Wheels:
-    """clip(u, -s, s)."""
-    return Wheels(*(jnp.clip(own, -level, level) for own in u))
+def input_saturation(u: Wheels, level: Array, soft: Array) -> Wheels:
+    """clip(u, -s, s), or with `soft` 1 s tanh(u / s): what a driver gives that weakens before its limit."""
+    bound = jnp.where(jnp.isfinite(level), level, FAR)
+    return Wheels(*(jnp.where(soft > 0.5, bound * jnp.tanh(own / bound), jnp.clip(own, -level, level)) for own in u))
 
 
 def twist_quantisation(u: Wheels, mean: Array, difference: Array) -> Wheels:

@@ -56,7 +56,8 @@ def _quantised(s: str) -> tuple[str, ...]:
     )
 
 
-SATURATION = Step(_wheels(lambda s: f"u_{s} = clip(u_{s}, -{{level}}, {{level}})"))
+SATURATION = Step(_wheels(lambda s: f"u_{s} = pick({{soft}} > 0.5, {{level}} * tanh(u_{s} / {{level}}), "
+                                    f"clip(u_{s}, -{{level}}, {{level}}))"))  # fmt: skip
 QUANTISATION = Step((*_quantised("r"), *_quantised("l")))
 TWIST = Step((
     _rounded("a", "(0.5 * (u_r + u_l))", "{mean}"),
@@ -77,11 +78,17 @@ RATE_LIMIT = Step((
         f"u_{s} = b + clip(u_{s} - b, -0.5 * a, 0.5 * a)",
     )),
 ), memory=("now_r", "now_l"))  # fmt: skip
+GROWN = (
+    "a = clip({growth} * time, -1e300, 3.0)",
+    "b = pick(fabs(a) > 1e-4, {growth}, 1.0)",
+    "c = pick(fabs(a) > 1e-4, (exp(a) - 1.0) / b, time * (1.0 + 0.5 * a))",
+)
+"""How far a drift has come whose speed grows."""
 ASYMMETRIC_ZONE = Step((
     "f_r = f_r + {right}", "b_r = b_r - {right}", "f_l = f_l + {left}", "b_l = b_l - {left}",
 ))  # fmt: skip
-ZONE_DRIFT = Step(tuple(
-    f"{width} = clip({width} + {{rate}} * time, 0.0, 1e300)" for width in ("f_r", "f_l", "b_r", "b_l")
+ZONE_DRIFT = Step((
+    *GROWN, *(f"{width} = clip({width} + {{rate}} * c, 0.0, 1e300)" for width in ("f_r", "f_l", "b_r", "b_l")),
 ))  # fmt: skip
 DIRECTION = Step(("m_r = m_r + {right} * fabs(m_r)", "m_l = m_l + {left} * fabs(m_l)"))
 SAG = Step((
@@ -90,7 +97,8 @@ SAG = Step((
     "m_l = m_l * a",
 ))  # fmt: skip
 GAIN_DRIFT = Step((
-    "a = clip(1.0 + {rate} * time, 0.0, 1e300)",
+    *GROWN,
+    "a = clip(1.0 + {rate} * c, 0.0, 1e300)",
     "m_r = m_r * a",
     "m_l = m_l * a",
 ))  # fmt: skip

@@ -111,7 +111,8 @@ static inline void robot_rubbed(const double *n, const double *reached, double f
 static inline void robot_zone(double time, double *width)
 {
     double f_r = ROBOT_ZONE[0], f_l = ROBOT_ZONE[1], b_r = ROBOT_ZONE[0], b_l = ROBOT_ZONE[1];
-    (void)time;
+    double a = 0.0, b = 0.0, c = 0.0;
+    (void)a; (void)b; (void)c; (void)time;
     $ZONE
     width[0] = f_r; width[1] = f_l; width[2] = b_r; width[3] = b_l;
 }

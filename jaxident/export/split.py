@@ -110,7 +110,7 @@ def _effect(effect: Effect, model: Model, target: Target) -> Part:
     record, values = CATALOGUE[effect.name], values_of(effect)
     if ANY in target.fields:
         return Part(effect.name, FIELD, target.fields[ANY], effect=True)
-    if record.quantity in target.fields and _alone(effect, model, target):
+    if record.quantity in target.fields and _alone(effect, model) and _as_words_have_it(effect):
         return Part(effect.name, FIELD, target.fields[record.quantity], effect=True)
     if record.chance is not None:
         return Part(effect.name, LOST, "it acts by chance", effect=True)
@@ -131,7 +131,13 @@ def _discovered(target: Target) -> Part:
     return Part(DISCOVERED, LOST, f"{target.title} has no word for the curve of a signal")
 
 
-def _alone(effect: Effect, model: Model, target: Target) -> bool:
+def _as_words_have_it(effect: Effect) -> bool:
+    """Whether what acts on commands has its first form: a field that limits commands cuts them off."""
+    record, values = CATALOGUE[effect.name], values_of(effect)
+    return record.stage not in INPUT or all(values[p.name] == p.neutral for p in record.parameters if p.forms)
+
+
+def _alone(effect: Effect, model: Model) -> bool:
     """Whether a field may stand for the effect although the wrapper acts before it. A limit or a delay can change
     places with what is the same for each wheel at any time; it cannot with what mixes wheels or goes by the clock."""
     record = CATALOGUE[effect.name]

@@ -66,6 +66,25 @@ def test_commands_that_are_rounded_towards_zero():
     assert np.abs(found - wanted).max() < tolerance(("input_quantisation",))
 
 
+FORMS = [
+    ("input_saturation", {"level": 0.6}, {"soft": 1.0}),
+    ("gain_drift", {"rate": -0.02}, {"growth": 1.0}),
+    ("dead_zone_drift", {"rate": 0.02}, {"growth": -1.0}),
+]
+
+
+@pytest.mark.parametrize(("name", "plain", "form"), FORMS, ids=[name for name, *_ in FORMS])
+def test_the_other_forms_of_effects(name, plain, form):
+    log, law = drive_log(), plain | form
+    found = full(to_vector([Effect(name, law)]), log, substeps=substeps_for(frozenset({name})))
+    command = np.array(log.u_r), np.array(log.u_l)
+    wanted, other = (
+        simulate_reference(PARAMETERS, {name: each}, log.t, *command, START, step=1e-3) for each in (law, plain)
+    )
+    assert np.abs(other - wanted).max() > 1e-3
+    assert np.abs(found - wanted).max() < tolerance((name,))
+
+
 @pytest.mark.parametrize("spin", [0.0, 0.02])
 def test_a_dry_wheel_that_slides(spin):
     law, log = {"limit": 0.5, "dry": 1.0, "spin": spin}, drive_log()

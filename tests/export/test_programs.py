@@ -34,10 +34,11 @@ GROUPS = {
     "gears": (("input_quantisation", "input_rate_limit", "backlash", "slope", "payload_change", "camera_tilt"), 2e-4),
     "rub": (("coulomb_friction", "stiction"), SHARP),
     "grip": (("traction_limit",), SMOOTH),
-    "casts": (("input_quantisation",), SMOOTH),
+    "forms": (("input_quantisation", "input_saturation", "gain_drift", "dead_zone_drift"), SMOOTH),
 }  # fmt: skip
-CASTS = {"input_quantisation": {"towards_zero": 1.0}}
-"""Forms of the effects of the last group."""
+FORMS = {"input_quantisation": {"towards_zero": 1.0}, "input_saturation": {"soft": 1.0},
+         "gain_drift": {"growth": 0.15}, "dead_zone_drift": {"growth": -0.05}}  # fmt: skip
+"""Forms of the effects of the last group; one drift ends after 20 of 30 s."""
 
 
 def commands(rows=ROWS, seed=0) -> np.ndarray:
@@ -67,7 +68,7 @@ def test_the_groups_hold_every_effect_that_has_statements():
 @pytest.mark.parametrize("group", GROUPS)
 def test_programs_move_as_the_simulator(group, tmp_path):
     names, bound = GROUPS[group]
-    model, u = robot(names, CASTS if group == "casts" else {}), commands()
+    model, u = robot(names, FORMS if group == "forms" else {}), commands()
     own = python_poses(python.write(model, model.effects), u)
     wanted = simulated(model, u)
     assert np.abs(own - wanted).max() < bound

@@ -234,6 +234,8 @@ def test_what_a_diagnosis_says_of_an_effect_is_what_stays(tmp_path):
 def test_a_limit_before_what_mixes_wheels_stands_in_the_wrapper():
     both = with_effects(PLAIN, [("input_saturation", {"level": 0.6}), ("supply_sag", {"resistance": 0.1})])
     assert ways(ji.export(both, "mjcf"))["input_saturation"] == "wrapper"
+    soft = with_one("input_saturation", level=0.6, soft=1.0)
+    assert ways(ji.export(soft, "mjcf"))["input_saturation"] == "wrapper", "its field cuts off"
     late = with_effects(PLAIN, [("transport_delay", {"delay": 0.05}), ("gain_drift", {"rate": -0.02})])
     assert ways(ji.export(late, "mjcf"))["transport_delay"] == "wrapper"
     alone = with_one("input_saturation", level=0.6)

@@ -113,13 +113,19 @@ class Robot:
         u, session = self.commanded(time), time + self.offset
         passed = []
         for wheel, side in enumerate(("right", "left")):
-            width = max(self.dead_zone[wheel] + self.of("dead_zone_drift", "rate") * session, 0.0)
+            width = max(self.dead_zone[wheel] + self.drifted("dead_zone_drift", session), 0.0)
             skew = self.of("asymmetric_dead_zone", side)
             ahead, back = max(width + skew, 0.0), max(width - skew, 0.0)
             m = u[wheel] - ahead if u[wheel] > ahead else u[wheel] + back if u[wheel] < -back else 0.0
             m *= 1.0 + self.of("direction_gain", side) * np.sign(m)
-            passed.append(m * max(1.0 + self.of("gain_drift", "rate") * session, 0.0))
+            passed.append(m * max(1.0 + self.drifted("gain_drift", session), 0.0))
         return np.array(passed) / (1.0 + self.of("supply_sag", "resistance") * (abs(u[0]) + abs(u[1])))
+
+    def drifted(self, name, session):
+        """How far a drift has come: the integral of rate exp(growth t), until growth t is 3."""
+        rate, growth = self.of(name, "rate"), self.of(name, "growth")
+        last = min(session, 3.0 / growth) if growth > 0.0 else session
+        return rate * (last if growth == 0.0 else (math.exp(growth * last) - 1.0) / growth)
 
     def coasting(self, state):
         """What lets each wheel coast, in commands."""
@@ -281,6 +287,8 @@ def polled(effects, arrivals, offset):
 def sent_commands(effects, u, rng):
     """Commands (samples, 2) that leave for the robot."""
     level = effects.get("input_saturation", {}).get("level", math.inf)
+    if effects.get("input_saturation", {}).get("soft", 0.0):
+        u = level * np.tanh(u / level)
     u = np.minimum(np.maximum(u, -level), level)
     for row, (right, left) in enumerate(u if "twist_quantisation" in effects else []):
         steps = effects["twist_quantisation"]

@@ -149,6 +149,9 @@ LIMITED = {(GRIP, "inverse_square"): 3.0}
 DRY = {**LIMITED, (GRIP, "dry"): 1.0}
 LOOSE = {(PLAY, "right"): 0.03, (PLAY, "left"): 0.04}
 COASTING = {**LOOSE, (PLAY, "coasting"): 1.0}
+LEVEL = "input_saturation"
+CUT = {(LEVEL, "level"): 0.6}
+SOFT = {**CUT, (LEVEL, "soft"): 1.0}
 STEPS = "input_quantisation"
 NEAREST = {(STEPS, "step"): 0.15}
 TO_ZERO = {**NEAREST, (STEPS, "towards_zero"): 1.0}
@@ -156,8 +159,9 @@ TO_ZERO = {**NEAREST, (STEPS, "towards_zero"): 1.0}
 
 @pytest.mark.parametrize(
     ("true", "begun"),
-    [(LIMITED, DRY), (DRY, LIMITED), (LOOSE, COASTING), (COASTING, LOOSE), (NEAREST, TO_ZERO), (TO_ZERO, NEAREST)],
-    ids=["tyre", "dry", "resting", "coasting", "nearest", "zero"],
+    [(LIMITED, DRY), (DRY, LIMITED), (LOOSE, COASTING), (COASTING, LOOSE), (NEAREST, TO_ZERO), (TO_ZERO, NEAREST),
+     (CUT, SOFT), (SOFT, CUT)],
+    ids=["tyre", "dry", "resting", "coasting", "nearest", "zero", "cut", "soft"],
 )  # fmt: skip
 def test_an_effect_in_the_wrong_form_takes_the_other(true, begun):
     (name,) = {name for name, _ in true}

@@ -85,6 +85,9 @@ def test_without_effects_it_is_the_nominal_robot(log, follow):
 FORMS = [
     ("backlash", {"coasting": 1.0}),
     ("input_quantisation", {"towards_zero": 1.0}),
+    ("input_saturation", {"soft": 1.0}),
+    ("gain_drift", {"growth": 0.5}),
+    ("dead_zone_drift", {"growth": -0.5}),
     ("traction_limit", {"dry": 1.0}),
     ("traction_limit", {"dry": 1.0, "spin": 0.03}),
 ]
