@@ -169,6 +169,7 @@ def test_no_prediction_is_beyond_the_angles_of_a_wheel():
     assert beyond_range(with_law(*LAWS[-1]), log, starts, pose, 0.0) == []
 
 
+@pytest.mark.slow  # its programs take 25 s to compile; `test_paths` looks at the angle in windows
 def test_a_wheel_begins_at_the_angle_that_it_had_there():
     """Poses before a start tell the angle: a free run from far within a run ends near the robot, though nobody says how
     far the wheel had turned."""

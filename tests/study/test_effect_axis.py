@@ -80,6 +80,7 @@ def recorded(study, robot):
     return jax.jit(record)(base, *(jax.tree.map(lambda leaf: leaf[0], part) for part in (where, command)))
 
 
+@pytest.mark.slow  # two programs more, which take 12 s to compile
 def test_robots_may_have_discovered_laws():
     """They move as the simulator says, those without as they do alone, and the law is told with the results."""
     plain = SMALL.robots[0]

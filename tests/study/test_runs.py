@@ -40,6 +40,7 @@ def test_the_first_run_is_the_trial_with_one_run_and_the_others_have_draws_of_th
     np.testing.assert_allclose(made.exact.x.reshape(3, 60)[:, 0], 0.0)
 
 
+@pytest.mark.slow  # a program more, which takes 15 s to compile
 def test_effects_go_on_from_run_to_run():
     """A load comes after 4 s, in the third run of 2 s: poses are those of `simulate_runs`."""
     study = THREE._replace(effects=(EffectSet("load", PAYLOAD),))

@@ -139,7 +139,7 @@ def test_an_effect_without_a_derivative_that_the_fit_has_is_there_once():
     first = tabulate(data, nominal, ())
     best = max((k for k, o in enumerate(first.options) if o.effect == "input_saturation"),
                key=lambda k: log_evidence(first, [k]))  # fmt: skip
-    assert first.options[best].point == {"level": 0.6}
+    assert first.options[best].point == {"level": 0.6, "soft": 0.0}
     found = fit_options(data, first, stands(nominal, ()), [best])
     assert found.fit.vector[PLACES["input_saturation", "level"]] == pytest.approx(0.6, abs=1e-3)
     table = tabulate(data, found.fit, found.effects)

@@ -36,7 +36,10 @@ def starts_of(count, windows) -> np.ndarray:
     return 0.1 * np.random.default_rng(count).normal(size=(count, 5, len(windows.run)))
 
 
-@pytest.mark.parametrize(("count", "copies"), [(1, 1), (AT_ONCE, 1), (AT_ONCE + 1, 1), (2 * AT_ONCE - 1, 1), (2, 7)])
+MANY = pytest.param(2, 7, marks=pytest.mark.slow, id="many windows")  # its programs take 14 s to compile
+
+
+@pytest.mark.parametrize(("count", "copies"), [(1, 1), (AT_ONCE, 1), (AT_ONCE + 1, 1), (2 * AT_ONCE - 1, 1), MANY])
 def test_vectors_side_by_side_are_those_one_after_the_other(windows, count, copies):
     """Seven copies of the windows are so many that a call takes one vector."""
     windows = take(windows, np.tile(np.arange(len(windows.run)), copies))
