@@ -20,9 +20,10 @@ import jax.export
 import jaxlib
 
 FEW = 64
-"""Counts up to which `roomy` keeps two binary digits, so that few programs serve all short logs; beyond it keeps four,
-for there a program runs longer than it compiles. Of three runs of 600 to 720 rows, a log that needs new programs took
-`identify` 35 s and `diagnose` 20 s on two cores, one that finds them 3 and 9 s. No other numbers were tried."""
+"""Blocks in all, such as windows of rows, up to which `roomy` keeps two binary digits of a count, so that few programs
+serve all short logs; beyond it keeps four, for there a program runs longer than it compiles. On two cores a log of three
+runs of 600 to 720 rows takes `identify` 35 s and `diagnose` 20 s if it needs new programs, 3 and 9 s if it finds them. No
+other numbers were tried."""
 DIGEST = hashlib.sha256().digest_size
 _named: set[type] = set()
 
@@ -68,10 +69,12 @@ def kept_program(*tuples: type, static: tuple[str, ...] = ()) -> Callable[[Calla
     return wrap
 
 
-def roomy(count: int) -> int:
-    """The count that a program is compiled for where `count` are needed: 1, 2, 3, 4, 6, 8, 12, ... up to FEW, by which
-    at most half is added, beyond at most an eighth."""
-    grain = 1 << max(count.bit_length() - (2 if count <= FEW else 4), 0)
+def roomy(count: int, whole: int | None = None) -> int:
+    """The count that a program is compiled for where `count` are needed, one side of a rectangle of `whole` in all.
+
+    1, 2, 3, 4, 6, 8, 12, ..., by which at most half is added; where `whole` is beyond FEW at most an eighth.
+    """
+    grain = 1 << max(count.bit_length() - (2 if (whole or count) <= FEW else 4), 0)
     return -(-count // grain) * grain
 
 

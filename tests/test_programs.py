@@ -129,3 +129,4 @@ def test_counts_have_room_for_more():
     ]
     for count in range(1, 40 * FEW):
         assert count <= roomy(count) == roomy(roomy(count)) <= (1.5 if count <= FEW else 1.125) * count
+        assert count <= roomy(count, 1000 * count) <= 1.125 * max(count, 8)

@@ -11,7 +11,8 @@ from jaxident.effects.signals import Load, Zone
 
 MOST_GROWN = 3.0
 """A drift whose speed grows ends where it is exp(3) times as fast as it began: a model of a session of minutes must not
-throw a robot out of the room an hour later. The square of time over a whole session asks for 1.9."""
+throw a robot out of the room an hour later. A drift with the square of time comes to g t = 1.9 at the end of a session
+(least squares in rate, growth and gain). No other value was tried."""
 NEARLY_LINEAR = 1e-4
 """Size of g t below which three terms of the series are exact to a part in 1e13, and their derivative is finite."""
 

@@ -110,7 +110,7 @@ def _effect(effect: Effect, model: Model, target: Target) -> Part:
     record, values = CATALOGUE[effect.name], values_of(effect)
     if ANY in target.fields:
         return Part(effect.name, FIELD, target.fields[ANY], effect=True)
-    if record.quantity in target.fields and _alone(effect, model) and _as_words_have_it(effect):
+    if record.quantity in target.fields and _alone(effect, model) and _in_first_form(effect):
         return Part(effect.name, FIELD, target.fields[record.quantity], effect=True)
     if record.chance is not None:
         return Part(effect.name, LOST, "it acts by chance", effect=True)
@@ -131,8 +131,9 @@ def _discovered(target: Target) -> Part:
     return Part(DISCOVERED, LOST, f"{target.title} has no word for the curve of a signal")
 
 
-def _as_words_have_it(effect: Effect) -> bool:
-    """Whether what acts on commands has its first form: a field that limits commands cuts them off."""
+def _in_first_form(effect: Effect) -> bool:
+    """Whether what acts before the wheels has the first of its forms, as fields of simulators have it: those that limit
+    commands cut them off."""
     record, values = CATALOGUE[effect.name], values_of(effect)
     return record.stage not in INPUT or all(values[p.name] == p.neutral for p in record.parameters if p.forms)
 

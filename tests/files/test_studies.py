@@ -62,8 +62,8 @@ def test_sets_of_effects_become_robots():
     assert found[0] == {}
     assert found[1]["motor_lag"] == {"time_constant": 0.03}
     assert found[1]["slope"] == {"acceleration": 0.1, "direction": 0.7}  # the direction is a shape
-    assert found[2:4] == [{"stiction": {"right": 0.1}}, {"input_saturation": {"level": 0.3}}]
-    assert found[4] == {"input_saturation": {"level": 0.15}}
+    assert found[2:4] == [{"stiction": {"right": 0.1}}, {"input_saturation": {"level": 0.3, "soft": 0.0}}]
+    assert found[4] == {"input_saturation": {"level": 0.15, "soft": 0.0}}
     assert describe(study)["robots"][2]["effects"] == found[1]
 
 

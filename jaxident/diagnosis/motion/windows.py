@@ -125,22 +125,25 @@ def with_room(windows: Windows) -> Windows:
     """The windows with copies of the last one behind them, and pieces with rows that go on as the last one and copies
     of the last piece behind: one program then serves logs of many lengths (`roomy`)."""
     rows, pieces = windows.t.shape
-    row, piece = _filling(rows, ROWS), _filling(pieces)
+    blocks = -(-rows // ROWS)
+    row, piece = _filling(rows, ROWS * roomy(blocks, blocks * pieces)), _filling(pieces, roomy(pieces, blocks * pieces))
     beyond = np.maximum(np.arange(len(row)) - (rows - 1), 0)[:, None]
     t = windows.t[row] + beyond * (windows.t[-1] - windows.t[-2])
-    return take(windows, _filling(len(windows.run)))._replace(
+    own = len(windows.run)
+    return take(windows, _filling(own, roomy(own)))._replace(
         t=t[:, piece], session=windows.session[piece], command=windows.command[row][:, piece]
     )
 
 
 def filled_up(starts: Array) -> np.ndarray:
     """Start states (..., windows) of windows that got room."""
-    return np.take(starts, _filling(np.shape(starts)[-1]), axis=-1)
+    own = np.shape(starts)[-1]
+    return np.take(starts, _filling(own, roomy(own)), axis=-1)
 
 
-def _filling(count: int, unit: int = 1) -> np.ndarray:
-    """Places of the first `count`, then the last one again."""
-    return np.minimum(np.arange(unit * roomy(-(-count // unit))), count - 1)
+def _filling(count: int, room: int) -> np.ndarray:
+    """Places (room,) of the first `count`, then the last one again and again."""
+    return np.minimum(np.arange(room), count - 1)
 
 
 def take(windows: Windows, chosen: Array) -> Windows:

@@ -13,7 +13,7 @@ from jaxident.programs import roomy
 WINDOW = 200
 """Rows of the windows that the starter fits: long enough for a slow pole, too short for slip to pile up."""
 SHORT = 25
-"""Rows that padding of many short runs comes in: 402 of a Husky's of 40 rows, padded to windows, took four times as
+"""Rows that room comes in for many short runs: 402 of a Husky's of 40 rows, padded to windows, took four times as
 long."""
 MANY = 8
 """Runs from which on padding of short ones costs more than a program of their own. No other number was tried."""
@@ -80,7 +80,8 @@ def with_room(runs: Runs) -> Runs:
     program then serves logs of many lengths (`roomy`). Rows come in whole windows, of many short runs in fewer."""
     count, rows = runs.seen.shape
     unit = SHORT if count > MANY and rows <= WINDOW else WINDOW
-    more = roomy(count) - count, unit * roomy(-(-rows // unit)) - rows
+    blocks = -(-rows // unit)
+    more = roomy(count, count * blocks) - count, unit * roomy(blocks, count * blocks) - rows
 
     def padded(column: Array) -> np.ndarray:
         if np.ndim(column) == 0:

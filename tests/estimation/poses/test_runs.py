@@ -13,7 +13,7 @@ from jaxident.estimation.poses.curvature import Point, local_at_best_deviations
 from jaxident.estimation.poses.maximum_likelihood import _regular, begin, fit_from, fit_runs
 from jaxident.estimation.poses.parameters import Law, Robot, to_vector
 from jaxident.estimation.poses.prior import prior_of
-from jaxident.estimation.poses.runs import MANY, WINDOW, rows_used, stack_runs, with_room
+from jaxident.estimation.poses.runs import MANY, SHORT, WINDOW, rows_used, stack_runs, with_room
 from jaxident.log import join
 from jaxident.programs import FEW, roomy
 from jaxident.robot.noise import Noise
@@ -52,12 +52,26 @@ def test_room_changes_nothing_that_a_fit_is_made_of(law, jitter):
 
 def test_logs_of_many_lengths_share_a_program():
     compiled = None
-    for rows in ([110, 195, 122, 50, 133], [195, 110, 122, 150, 133, 170]):
-        found = identify([logged(k, NOISE, own) for k, own in enumerate(rows)], noise_law="white")
-        assert found.fit.innovations.normalised.shape == (len(rows), 3, max(rows))
-        assert found.fit.starts.shape == (len(rows), 5)
+    for rows in (310, 395, 322):
+        found = identify(logged(3, NOISE, rows))
+        assert found.fit.innovations.normalised.shape == (1, 3, rows)
         assert compiled in (None, fit_from._cache_size())
         compiled = fit_from._cache_size()
+
+
+def test_logs_of_five_and_six_runs_share_a_shape():
+    logs = ([110, 195, 122, 50, 133], [195, 110, 122, 150, 133, 170])
+    each = [with_room(stack_runs(join([logged(k, rows=rows) for k, rows in enumerate(own)]))) for own in logs]
+    assert each[0].seen.shape == each[1].seen.shape == (6, WINDOW)
+    assert not each[0].seen[5].any()
+
+
+@pytest.mark.slow  # its programs take 20 s to compile
+def test_what_a_fit_tells_is_of_the_logs_own_runs_and_rows():
+    rows = [110, 195, 122, 50, 133]
+    found = identify([logged(k, NOISE, own) for k, own in enumerate(rows)], noise_law="white")
+    assert found.fit.innovations.normalised.shape == (5, 3, 195)
+    assert found.fit.starts.shape == (5, 5)
 
 
 @pytest.mark.parametrize(("poses", "enough"), [(13, True), (11, False)])
@@ -74,7 +88,7 @@ def test_many_short_runs_get_fewer_rows_than_whole_windows():
     for rows, expected in ((40, 50), (50, 50), (176, 200)):
         runs = stack_runs(join([logged(k, rows=rows) for k in range(MANY + 1)]))
         padded = with_room(runs)
-        assert padded.seen.shape == (roomy(MANY + 1), expected)
+        assert padded.seen.shape == (roomy(MANY + 1, (MANY + 1) * expected // SHORT), expected)
         assert int(padded.seen.sum()) == int(runs.seen.sum())
         assert rows_used(padded) == rows
 
