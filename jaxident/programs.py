@@ -21,8 +21,8 @@ import jaxlib
 
 FEW = 64
 """Blocks in all, such as windows of rows, up to which `roomy` keeps two binary digits of a count, so that few programs
-serve all short logs; beyond it keeps four, for there a program runs longer than it compiles. On two cores a log of three
-runs of 600 to 720 rows takes `identify` 35 s and `diagnose` 20 s if it needs new programs, 3 and 9 s if it finds them. No
+serve all short logs; beyond it keeps four, for there a program runs longer than it compiles. Three runs of 600 to 720
+rows take `identify` 35 s and `diagnose` 20 s on two cores if they need new programs, 3 and 9 s if they find them. No
 other numbers were tried."""
 DIGEST = hashlib.sha256().digest_size
 _named: set[type] = set()
