@@ -90,9 +90,11 @@ def _sizes(names: list[str], values: Array) -> np.ndarray:
 
 
 def _clear(kind: str) -> float:
-    """The size of an effect's parameter in a clear case; 0 for what is no parameter of an effect."""
-    effect, _, parameter = kind.partition(".")
-    return abs(float(CATALOGUE[effect].typical().get(parameter, 0.0))) if effect in CATALOGUE else 0.0
+    """The size of an effect's parameter in a clear case, or where that is neutral the largest on real robots; 0 for
+    what is no parameter of an effect."""
+    effect, _, name = kind.partition(".")
+    own = [each for each in CATALOGUE[effect].parameters if each.name == name] if effect in CATALOGUE else []
+    return max((abs(each.typical) or max(map(abs, each.range)) for each in own), default=0.0)
 
 
 def parameter_values(model: Model) -> dict[str, float]:

@@ -137,6 +137,14 @@ def test_a_parameter_at_its_bound_is_moved_by_a_fair_step():
         assert np.min(np.linalg.norm(np.abs(told) - np.abs(moved), axis=1)) < 0.15 * np.linalg.norm(moved)
 
 
+def test_a_shape_that_hardly_shapes_is_moved_by_a_fair_step():
+    """The growth of a drift is 0 in a clear case: its step is that of the largest on real robots."""
+    law = Effect("gain_drift", {"rate": 0.001, "growth": 2e-6})
+    model = dataclasses.replace(uncertain(), discovered=(), effects=(law,), covariance=np.diag([0.05, 5e-4]) ** 2,
+                                parameter_order=("rate_1", "gain_drift.growth"))  # fmt: skip
+    np.testing.assert_allclose([size for _, size in directions(model)], 1e-4)
+
+
 def test_parameters_of_nothing_are_moved_by_a_part_of_their_deviation():
     """Steps of 1e-10 in dead zones of 0 drowned in rounding: predicted deviations were 7e7 m."""
     order, deviation = ("rate_1", "dead_zone_r", "dead_zone_l"), np.array([0.3, 0.5, 0.4])
