@@ -45,6 +45,14 @@ def directions(model: Model) -> list[tuple[Model, float]]:
     ]
 
 
+def opposite(model: Model, other: Model) -> Model | None:
+    """The robot as far from a model as another one, on the other side; None where that one's laws have more knots."""
+    here, there = parameter_values(model), parameter_values(other)
+    if here.keys() != there.keys():
+        return None
+    return with_values(model, {name: 2.0 * value - there[name] for name, value in here.items()})
+
+
 def _continued(law: Discovered) -> list[Discovered]:
     """A law that goes on beyond each end of its knots, as steep as it is inside (root mean square), STEP of that: what
     it does there nobody has seen. From FURTHER of its range on it is constant again."""

@@ -16,7 +16,7 @@ from jaxident.effects.law_kinds import ANGLE, MOST_LAWS
 from jaxident.effects.past import Past
 from jaxident.estimation.ahead.camera_noise import noise_for
 from jaxident.estimation.ahead.filtered_state import Run, filter_and_run
-from jaxident.estimation.ahead.parameter_spread import directions
+from jaxident.estimation.ahead.parameter_spread import directions, opposite
 from jaxident.estimation.ahead.stretches import AXES, Starts, Stretch, cut_stretches, until_last_start
 from jaxident.estimation.ahead.wheel_phase import closer, followed, phases_of
 from jaxident.estimation.increments.observations import blind, repeats
@@ -40,6 +40,10 @@ filled up, and more cores have work. A prediction from eight starts or fewer tak
 which would be a second program to compile (6 s)."""
 
 
+JUMP = 30.0
+"""Times the median of all starts that the slope of the heading by a parameter may be before the other side is looked
+at. At one start of 779 of a robot in a wrong session time it was a million times that, and the predicted deviation of
+all 35 rad. No other number was tried."""
 ANGLE_STEP = 1e-3
 """Step of the differences by the angle of a wheel [rad]."""
 
@@ -98,12 +102,25 @@ def run_ahead(model: Model, log: Log, starts: Starts, horizon: int, *, burn_in: 
     def there(robot: Model, phase: Array, sure: Array) -> np.ndarray:
         return np.moveaxis(run(robot, phase, stretch, sure).pose[ahead], -1, 0)
 
-    slopes = [_less(there(other, phase, sure), pose) / size for other, size in directions(model)]
+    slopes = [_slope(lambda robot: there(robot, phase, sure), pose, model, *each) for each in directions(model)]
     for k in laws_of_wheels(model):
         whole, turn = np.ones(sure.shape), ANGLE_STEP * (np.arange(MOST_LAWS) == k)[:, None]
         slope = _less(there(model, phase + turn, whole), there(model, phase, whole)) / ANGLE_STEP
         slopes.append(slope * np.minimum(deviation[k], 1.0)[:, None, None])  # an angle that may be any: as a sine's
     return Ahead(pose, begin, slip, np.array(slopes).reshape(-1, *pose.shape), run_up)
+
+
+def _slope(there: Callable[[Model], Array], pose: Array, model: Model, other: Model, size: float) -> np.ndarray:
+    """Slopes (starts, horizon, 3) of a model's poses towards another robot, `size` deviations away; where poses jump
+    between the two, the slope on the other side."""
+    slope = _less(there(other), pose) / size
+    each = np.abs(slope[..., 2]).max(axis=1)
+    steep = each > JUMP * np.median(each)
+    if not steep.any() or (across := opposite(model, other)) is None:
+        return slope
+    back = _less(pose, there(across)) / size
+    jumps = steep & (np.abs(back[..., 2]).max(axis=1) < each)
+    return np.where(jumps[:, None, None], back, slope)
 
 
 def laws_of_wheels(model: Model) -> list[int]:

@@ -7,8 +7,8 @@ import pytest
 
 import jaxident as ji
 from jaxident.effects.law_kinds import value_name
-from jaxident.estimation.ahead.parameter_spread import MIXED, directions, parameter_values, with_values
-from jaxident.estimation.ahead.run_ahead import run_ahead
+from jaxident.estimation.ahead.parameter_spread import MIXED, directions, opposite, parameter_values, with_values
+from jaxident.estimation.ahead.run_ahead import _slope, run_ahead
 from jaxident.estimation.ahead.stretches import every
 from jaxident.robot.drive import Physical
 from jaxident.robot.model import Discovered, Effect, Model
@@ -143,6 +143,23 @@ def test_a_shape_that_hardly_shapes_is_moved_by_a_fair_step():
     model = dataclasses.replace(uncertain(), discovered=(), effects=(law,), covariance=np.diag([0.05, 5e-4]) ** 2,
                                 parameter_order=("rate_1", "gain_drift.growth"))  # fmt: skip
     np.testing.assert_allclose([size for _, size in directions(model)], 1e-4)
+
+
+def test_a_jump_of_a_start_is_no_slope():
+    """Beyond the model's rate the poses of one start are another path's; on the near side they go on as all others."""
+    model, size = dataclasses.replace(uncertain(), discovered=()), 1e-4
+    other = with_values(model, {"rate_1": 3.0 + 0.05 * size})
+    slope = np.random.default_rng(0).uniform(0.5, 1.5, (20, 4, 3))
+
+    def there(robot):
+        moved = float(robot.dynamics.rate[0]) - 3.0
+        jump = np.zeros(slope.shape)
+        jump[7] = 0.1 * (moved > 0.0)
+        return moved / 0.05 * slope + jump
+
+    np.testing.assert_allclose(_slope(there, there(model), model, other, size), slope, rtol=1e-6)
+    beyond = directions(dataclasses.replace(uncertain(), covariance=np.eye(7)))[-1][0]
+    assert opposite(uncertain(), beyond) is None
 
 
 def test_parameters_of_nothing_are_moved_by_a_part_of_their_deviation():
