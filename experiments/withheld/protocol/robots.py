@@ -224,7 +224,7 @@ FORMS = {
     "outliers": "log-normal sizes",
     "frozen_frames": "three in a row",
 }
-"""Effects that have another form than the catalogue's, and which."""
+"""Effects that had another form than the catalogue's when the set was drawn, and which."""
 
 
 def form(name: str, parameters: dict, session: float) -> float:

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from support.small_robot import VECTOR, windows_of
 
+from jaxident.diagnosis.motion import linear
 from jaxident.diagnosis.motion.driving import AT_ONCE, FEW_WINDOWS, _pushed, pushes_of
-from jaxident.diagnosis.motion.linear import _residuals as _many
 from jaxident.diagnosis.motion.linear import follow
 from jaxident.diagnosis.motion.paths import push_of, residuals, rolled
 from jaxident.diagnosis.motion.rims import rim_speeds
@@ -74,5 +74,5 @@ def test_logs_of_other_lengths_run_through_the_same_programs(windows):
         few = take(windows, np.arange(count))
         few = few._replace(t=few.t[: 320 - count], command=few.command[: 320 - count])
         assert follow(VECTOR[None], starts_of(1, few), few).shape[1] == count
-        compiled.append((_many._cache_size(), _pushed._cache_size()))
+        compiled.append((linear._residuals._cache_size(), _pushed._cache_size()))
     assert len(set(compiled)) == 1
