@@ -56,7 +56,7 @@ def payload_lightness(time: Array, step: Array, loss: Array, instant: Array) -> 
 
 
 GROWTH = Parameter("growth", "1/s", 0.0, (-0.05, 0.05), 0.0, shape=True)
-"""How fast the speed of a drift grows. Time constants of 20 s and more are the range; of no robot one was measured."""
+"""How fast the speed of a drift grows. Its range is that of time constants of 20 s and more; none was measured."""
 RECORDS = (
     EffectRecord(
         name="gain_drift", site="time", stage="motor", step=statements.GAIN_DRIFT,
