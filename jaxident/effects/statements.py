@@ -83,7 +83,7 @@ GROWN = (
     "b = pick(fabs(a) > 1e-4, {growth}, 1.0)",
     "c = pick(fabs(a) > 1e-4, (exp(a) - 1.0) / b, time * (1.0 + 0.5 * a))",
 )
-"""How far a drift has come whose speed grows (`session.grown`)."""
+"""How far a drift has come whose speed grows: `session.grown`, with its two constants."""
 ASYMMETRIC_ZONE = Step((
     "f_r = f_r + {right}", "b_r = b_r - {right}", "f_l = f_l + {left}", "b_l = b_l - {left}",
 ))  # fmt: skip

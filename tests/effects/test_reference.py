@@ -54,19 +54,8 @@ def test_a_wheel_that_coasts_in_its_play():
     assert np.abs(found - wanted).max() < tolerance(("backlash",))
 
 
-def test_commands_that_are_rounded_towards_zero():
-    law, log = {"step": 0.15, "towards_zero": 1.0}, drive_log()
-    found = full(to_vector([Effect("input_quantisation", law)]), log, substeps=substeps_for(frozenset()))
-    command = np.array(log.u_r), np.array(log.u_l)
-    wanted, nearest = (
-        simulate_reference(PARAMETERS, {"input_quantisation": law | form}, log.t, *command, START, step=1e-3)
-        for form in ({}, {"towards_zero": 0.0})
-    )
-    assert np.abs(nearest - wanted).max() > 1e-2
-    assert np.abs(found - wanted).max() < tolerance(("input_quantisation",))
-
-
 FORMS = [
+    ("input_quantisation", {"step": 0.15}, {"towards_zero": 1.0}),
     ("input_saturation", {"level": 0.6}, {"soft": 1.0}),
     ("gain_drift", {"rate": -0.02}, {"growth": 1.0}),
     ("dead_zone_drift", {"rate": 0.02}, {"growth": -1.0}),

@@ -115,7 +115,8 @@ def _slope(there: Callable[[Model], Array], pose: Array, model: Model, other: Mo
     between the two, the slope on the other side."""
     slope = _less(there(other), pose) / size
     each = np.abs(slope[..., 2]).max(axis=1)
-    steep = each > JUMP * np.median(each)
+    usual = np.median(each)
+    steep = (each > JUMP * usual) & (usual > 0.0)  # a parameter may matter at few starts
     if not steep.any() or (across := opposite(model, other)) is None:
         return slope
     back = _less(pose, there(across)) / size
