@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from support.program import jaxident
 
-from jaxident.estimation.poses.maximum_likelihood import fit_from
+from jaxident.estimation.poses.stepwise import _look
 from jaxident.estimation.uncertainty.verdict import at_bound, bound_doubts, verdicts
 from jaxident.files.logs import write_log
 from jaxident.files.models import load_model
@@ -38,7 +38,7 @@ def identified(folder, seed):
 def test_a_fit_that_does_not_converge_ends_with_code_1_and_writes_nothing(tmp_path):
     """Of 40 such logs 5 do not converge: these. Rounding may bring one of them there. The second search, from
     elsewhere, is the first one's program."""
-    compiled = fit_from._cache_size()
+    compiled = _look._cache_size()
     for seed in (2, 10, 27, 32, 39):
         ended = identified(tmp_path, seed)
         if ended.returncode != 0:
@@ -46,7 +46,7 @@ def test_a_fit_that_does_not_converge_ends_with_code_1_and_writes_nothing(tmp_pa
         for path in tmp_path.iterdir():
             path.unlink()
     assert ended.returncode == 1, ended
-    assert fit_from._cache_size() == compiled + 1
+    assert _look._cache_size() == compiled + 1
     assert ended.stdout == ""
     assert (
         "did not converge, and nothing is written: its search stopped after 100 steps" in ended.stderr.splitlines()[-1]

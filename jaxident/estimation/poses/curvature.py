@@ -44,7 +44,8 @@ class Sums(NamedTuple):
     """Sums over the samples of one run, in its shared and own unknowns (n,).
 
     Of each sensor (sensors,): count of numbers; squares z^2; slope z dz (sensors, n); curvature E' E (sensors, n, n).
-    Of all together: log_variance log s, log_slope dlog s (n,), log_curvature dlog s' dlog s (n, n).
+    Of all together: log_variance log s, log_slope dlog s (n,), log_curvature dlog s' dlog s (n, n). found: the
+    innovations themselves.
     """
 
     count: Any
@@ -54,18 +55,23 @@ class Sums(NamedTuple):
     log_variance: Any
     log_slope: Any
     log_curvature: Any
+    found: Any
 
 
 def local_at(point: Point, runs: Runs, law: Law) -> Local:
     """Value, gradient and expected curvature at a point."""
-    sums = _sums_at(point, runs, law)
+    sums = sums_at(point, runs, law)
     return _local(sums, jnp.zeros(sums.count.shape[1]), len(point.shared))
 
 
 def local_at_best_deviations(point: Point, runs: Runs, law: Law) -> tuple[Point, Local]:
     """The point with the deviations of white errors at their optimum for the rest, and the same three there. With slip
     the camera's deviations divide more than z, and stay."""
-    sums = _sums_at(point, runs, law)
+    return at_best_deviations(point, sums_at(point, runs, law), law)
+
+
+def at_best_deviations(point: Point, sums: Sums, law: Law) -> tuple[Point, Local]:
+    """The same from the sums at the point."""
     mean = jnp.sum(sums.squares, axis=0) / jnp.maximum(jnp.sum(sums.count, axis=0), 1)
     moves = np.array([name == "wheel_noise" or not law.slip for name in deviations(law)])
     change = jnp.where(moves, 0.5 * jnp.log(jnp.maximum(mean, SMALLEST_SQUARE)), 0.0)
@@ -95,7 +101,7 @@ def _local(sums: Sums, change: Array, cut: int) -> Local:
     )
 
 
-def _sums_at(point: Point, runs: Runs, law: Law) -> Sums:
+def sums_at(point: Point, runs: Runs, law: Law) -> Sums:
     """The sums over each run (runs, ...)."""
     of_run = _general_sums if law.memory or law.slip or law.wheels else _white_sums
     unknowns = jnp.concatenate([jnp.tile(point.shared, (len(point.starts), 1)), point.starts], axis=1)
@@ -122,6 +128,7 @@ def _general_sums(unknowns: Column, run: Runs, law: Law) -> Sums:
         log_variance=jnp.sum(jnp.concatenate(log_variance)),
         log_slope=jnp.sum(together, axis=0),
         log_curvature=together.T @ together,
+        found=found,
     )
 
 
@@ -150,6 +157,7 @@ def _white_sums(unknowns: Column, run: Runs, law: Law) -> Sums:
         log_variance=jnp.sum(jnp.concatenate(log_variance)),
         log_slope=jnp.zeros(size).at[own].set(2.0 * count),
         log_curvature=jnp.zeros((size, size)).at[own, own].set(4.0 * count),
+        found=found,
     )
 
 

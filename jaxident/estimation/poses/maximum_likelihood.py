@@ -10,7 +10,7 @@ from jaxident.array_types import Array, Pose, Wheels
 from jaxident.estimation.poses.covariance import posterior_at
 from jaxident.estimation.poses.curvature import Point, local_at
 from jaxident.estimation.poses.likelihood import Innovations, innovations
-from jaxident.estimation.poses.parameters import Law, Robot, from_vector, to_vector
+from jaxident.estimation.poses.parameters import Law, Robot, from_vector, names, to_vector
 from jaxident.estimation.poses.prior import Prior, prior_of
 from jaxident.estimation.poses.runs import WINDOW, Runs, cut_windows, run_axes
 from jaxident.estimation.poses.scoring import Search, search_from, with_prior
@@ -97,18 +97,25 @@ def fit_runs(runs: Runs, d_max: Array, law: Law = WHITE, prior: Prior | None = N
 def fit_from(beginning: Beginning, runs: Runs, d_max: Array, law: Law, prior: Prior) -> Fit:
     """The estimate by a search from a given beginning."""
     search = search_from(first_point(beginning, runs, law), runs, law, d_max, MOST_STEPS, prior)
-    covariance, share = posterior_at(search.point, search.local, law, prior)
-    value = with_prior(search.local, search.point.shared, law, prior, -1.0).value
     found = jax.vmap(lambda start, run: innovations(search.point.shared, start, run, law), in_axes=(0, run_axes(runs)))(
         search.point.starts, runs
     )
+    return fit_of(search, found, runs, law, prior, jnp.zeros(len(names(law)), bool))
+
+
+def fit_of(search: Search, found: Innovations, runs: Runs, law: Law, prior: Prior, held: Array) -> Fit:
+    """The estimate where a search has ended with some innovations. The curvature of `held` unknowns (unknowns,), of
+    which the runs say nothing, is taken for 1."""
+    known = search.local._replace(shared=search.local.shared + jnp.diag(jnp.where(held, 1.0, 0.0)))
+    covariance, share = posterior_at(search.point, known, law, prior)
+    value = with_prior(search.local, search.point.shared, law, prior, -1.0).value
     return Fit(
         robot=from_vector(search.point.shared, law),
         starts=search.point.starts,
         covariance=covariance,
         log_likelihood=-value - 0.5 * numbers_in(runs, law) * jnp.log(2.0 * jnp.pi),
         innovations=found,
-        ok=search.arrived & _regular(search, covariance, runs),
+        ok=search.arrived & _regular(search, covariance, runs, held),
         steps=search.steps,
         prior=prior,
         prior_share=share,
@@ -124,11 +131,11 @@ def uncertain_as_by(fit: Fit, runs: Runs, law: Law) -> Fit:
     return fit._replace(covariance=covariance, prior_share=share)
 
 
-def _regular(search: Search, covariance: Array, runs: Runs) -> Array:
-    """Whether everything is finite and there are more numbers than unknowns."""
+def _regular(search: Search, covariance: Array, runs: Runs, held: Array) -> Array:
+    """Whether everything is finite and there are more numbers than unknowns that are not held (unknowns,)."""
     finite = [jnp.all(jnp.isfinite(part)) for part in (*search.point, search.local.value, covariance)]
     with_a_pose = jnp.sum(jnp.any(runs.seen, axis=1))
-    unknowns = search.point.shared.size + search.point.starts.shape[1] * with_a_pose
+    unknowns = jnp.sum(~held) + search.point.starts.shape[1] * with_a_pose
     return jnp.all(jnp.stack(finite)) & (3 * jnp.sum(runs.seen) > unknowns)
 
 

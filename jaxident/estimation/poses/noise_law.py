@@ -1,16 +1,16 @@
 """Which noise law the data ask for: white camera error where the residuals are white, else the likeliest law."""
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from jaxident.array_types import Array
 from jaxident.errors import InputError
-from jaxident.estimation.poses.maximum_likelihood import Beginning, Fit, begin, fit_from, numbers_in
+from jaxident.estimation.poses.maximum_likelihood import Beginning, Fit, begin, numbers_in
 from jaxident.estimation.poses.parameters import Law, names
 from jaxident.estimation.poses.prior import RATE, SIGNS, Prior, coasting, middle_gain, prior_of
 from jaxident.estimation.poses.residual_tests import whiteness
 from jaxident.estimation.poses.runs import Runs
+from jaxident.estimation.poses.stepwise import fit_stepwise
 
 NOISE_LAWS = {
     "white": Law(),
@@ -59,13 +59,13 @@ def fit_law(runs: Runs, d_max: Array, noise_law: str, coupling: bool) -> tuple[F
 def fit_twice(beginning: Beginning, runs: Runs, d_max: Array, law: Law, prior: Prior) -> tuple[Fit, Beginning]:
     """The fit from a beginning, and that beginning. Where the search does not arrive, one from the prior's middle takes
     its place if it is as likely; under slip one search is long enough."""
-    fit = jax.device_get(fit_from(beginning, runs, d_max, law, prior))
+    fit = fit_stepwise(beginning, runs, d_max, law, prior)
     if bool(fit.ok) or law.slip:
         return fit, beginning
     nothing = beginning.estimate._replace(gain=middle_gain(prior), dead_zone=jnp.zeros(2))
     nothing = nothing._replace(rate=jnp.array([RATE, RATE]))  # of `jnp.full` the type is weak: one program more
     middle = beginning._replace(estimate=nothing)
-    other = jax.device_get(fit_from(middle, runs, d_max, law, prior))
+    other = fit_stepwise(middle, runs, d_max, law, prior)
     least = float(fit.log_likelihood) - (AS_LIKELY if bool(other.ok) else 0.0)
     return (other, middle) if float(other.log_likelihood) >= least else (fit, beginning)
 
@@ -85,7 +85,7 @@ def settling_fit(beginning: Beginning, runs: Runs, d_max: Array, laws: list[Law]
     rate = jnp.where(held, RATE, jnp.asarray(fit.robot.drive.rate))
     estimate = estimate._replace(rate=rate, gain=jnp.asarray(middle_gain(prior)), dead_zone=jnp.zeros(2))
     begin = beginning._replace(estimate=estimate)
-    tried = [(jax.device_get(fit_from(begin, runs, d_max, law, prior)), law) for law in laws]
+    tried = [(fit_stepwise(begin, runs, d_max, law, prior), law) for law in laws]
     found = likeliest(tried, runs)
     return found if bool(found[0].ok) else None
 

@@ -118,10 +118,12 @@ def along_steady_speeds(shared: Unknowns, step: Unknowns) -> Unknowns:
     return (shared + step).at[2:6].set(gain)
 
 
-def propose(search: Search, kinked: Array, law: Law, low: Array, high: Array) -> tuple[Point, Array, Array]:
+def propose(
+    search: Search, kinked: Array, law: Law, low: Array, high: Array, held: Array
+) -> tuple[Point, Array, Array]:
     """The damped step from a search's point, shortened where it is long and cut at the bounds; whether it holds the
     dead zones, as it does where they seem to be at a kink and the others alone promise something; and whether the
-    point is a minimum.
+    point is a minimum. `held` unknowns (unknowns,) stay as they are, wherever the bounds are.
 
     It is one where the whole step promises next to nothing, or at a kink: where a dead zone meets a level of the
     commands the cost has two slopes. Both may point up, so that ever smaller steps of the dead zone fail while all
@@ -129,16 +131,16 @@ def propose(search: Search, kinked: Array, law: Law, low: Array, high: Array) ->
     """
     point, local, damping = search.point, search.local, search.damping
     slope = local.gradient.shared
-    held = ((point.shared <= low) & (slope >= 0.0)) | ((point.shared >= high) & (slope <= 0.0))
-    both = jnp.stack([held, held.at[DEAD_ZONES].set(True)])
-    steps, starts, (promised, rest) = jax.vmap(lambda held: cut_newton(local, damping, held, law))(both)
+    still = held | ((point.shared <= low) & (slope >= 0.0)) | ((point.shared >= high) & (slope <= 0.0))
+    both = jnp.stack([still, still.at[DEAD_ZONES].set(True)])
+    steps, starts, (promised, rest) = jax.vmap(lambda still: cut_newton(local, damping, still, law))(both)
     holding = kinked & (rest > KINK_TOLERANCE)
     step, starts = (jnp.where(holding, part[1], part[0]) for part in (steps, starts))
     longest = jnp.where(is_logarithmic(law), LONGEST_LOG_STEP, jnp.inf)
     longest = longest.at[DEAD_ZONES].set(LONGEST_SHARE * high[DEAD_ZONES])
     part = jnp.minimum(search.length, jnp.min(longest / jnp.maximum(jnp.abs(step), 1e-300)))
     shared = along_steady_speeds(point.shared, part * step)
-    moved = Point(jnp.clip(shared, low, high), point.starts + part * starts)
+    moved = Point(jnp.where(held, point.shared, jnp.clip(shared, low, high)), point.starts + part * starts)
     level = (promised >= 0.0) & (promised < TOLERANCE) & (damping.dead_zones <= FIRST_DAMPING)
     tiny = jnp.abs(steps[0]) * jnp.sqrt(jnp.diagonal(local.shared)) < KINK_STEP
     kink = (rest >= 0.0) & (rest * (1.0 + damping.others) < KINK_TOLERANCE) & jnp.all(tiny[DEAD_ZONES])
@@ -184,32 +186,43 @@ def with_prior(local: Local, shared: Unknowns, law: Law, prior: Prior, sign: flo
 
 def search_from(point: Point, runs: Runs, law: Law, d_max: Array, most: int, prior: Prior) -> Search:
     """Walk downhill from a point until a step promises less than TOLERANCE, at most `most` steps; values and curvatures
-    are those of poses and prior. Each whole step that fails halves the part of the
-    next one that is walked, down to SHORTEST."""
-    low, high = bounds(law, d_max)
+    are those of poses and prior. Each whole step that fails halves the part of the next one that is walked, down to
+    SHORTEST."""
+    free = jnp.zeros(len(names(law)), bool)
 
-    def body(search):
-        there, local = local_at_best_deviations(search.proposed, runs, law)
-        local = with_prior(local, there.shared, law, prior)
-        better = (local.value <= search.local.value) | (search.steps == 0)
-        tells = better | search.holding  # a whole step may have failed at a kink, which is no curvature
-        half = jnp.maximum(0.5 * search.length, SHORTEST)
-        length = jnp.where(tells, length_after(search, there, local), half)
-        point, local = jax.tree.map(lambda a, b: jnp.where(better, a, b), (there, local), (search.point, search.local))
-        after = adapt(search, better, better & (length == 1.0))._replace(
-            point=point, local=local, steps=search.steps + 1, length=length
-        )
-        kinked = (after.failures > 1) & ~search.holding
-        proposed, holding, arrived = propose(after, kinked, law, low, high)
-        return after._replace(proposed=proposed, holding=holding, arrived=arrived)
+    def body(search: Search) -> Search:
+        return advance(search, *local_at_best_deviations(search.proposed, runs, law), law, d_max, prior, free)
 
-    def walking(search):
-        return ~search.arrived & (search.steps < most) & (search.damping.others < LARGEST_DAMPING)
+    return jax.lax.while_loop(lambda search: walking(search, most), body, first_search(point, law))
 
+
+def first_search(point: Point, law: Law) -> Search:
+    """A search that is to look at a point first."""
     unknown, count = len(names(law)), len(point.starts)
     shapes = (unknown, unknown), (count, START_STATES, START_STATES), (count, unknown, START_STATES)
     nothing = Local(jnp.asarray(jnp.inf), jax.tree.map(jnp.zeros_like, point), *map(jnp.zeros, shapes))
     damping, no, none = Damping(*jnp.full(2, FIRST_DAMPING)), jnp.asarray(False), jnp.asarray(0)
-    return jax.lax.while_loop(
-        walking, body, Search(point, nothing, point, no, damping, jnp.asarray(1.0), none, none, no)
+    return Search(point, nothing, point, no, damping, jnp.asarray(1.0), none, none, no)
+
+
+def walking(search: Search, most: int) -> Array:
+    """Whether a search goes on, for `most` steps in all."""
+    return ~search.arrived & (search.steps < most) & (search.damping.others < LARGEST_DAMPING)
+
+
+def advance(search: Search, there: Point, local: Local, law: Law, d_max: Array, prior: Prior, held: Array) -> Search:
+    """One step of a search that has looked at the point it proposed: `there`, with the poses' `local`. `held` unknowns
+    (unknowns,) stay as they are."""
+    low, high = bounds(law, d_max)
+    local = with_prior(local, there.shared, law, prior)
+    better = (local.value <= search.local.value) | (search.steps == 0)
+    tells = better | search.holding  # a whole step may have failed at a kink, which is no curvature
+    half = jnp.maximum(0.5 * search.length, SHORTEST)
+    length = jnp.where(tells, length_after(search, there, local), half)
+    point, local = jax.tree.map(lambda a, b: jnp.where(better, a, b), (there, local), (search.point, search.local))
+    after = adapt(search, better, better & (length == 1.0))._replace(
+        point=point, local=local, steps=search.steps + 1, length=length
     )
+    kinked = (after.failures > 1) & ~search.holding
+    proposed, holding, arrived = propose(after, kinked, law, low, high, held)
+    return after._replace(proposed=proposed, holding=holding, arrived=arrived)

@@ -10,10 +10,11 @@ from support.diagonal_robot import DEAD_ZONE, DRIVE, PERIOD, logged
 
 from jaxident.estimation.identify import identify
 from jaxident.estimation.poses.curvature import Point, local_at_best_deviations
-from jaxident.estimation.poses.maximum_likelihood import _regular, begin, fit_from, fit_runs
+from jaxident.estimation.poses.maximum_likelihood import _regular, begin, fit_runs
 from jaxident.estimation.poses.parameters import Law, Robot, to_vector
 from jaxident.estimation.poses.prior import prior_of
 from jaxident.estimation.poses.runs import MANY, SHORT, WINDOW, rows_used, stack_runs, with_room
+from jaxident.estimation.poses.stepwise import _look
 from jaxident.log import join
 from jaxident.programs import FEW, roomy
 from jaxident.robot.noise import Noise
@@ -55,8 +56,8 @@ def test_logs_of_many_lengths_share_a_program():
     for rows in (310, 395, 322):
         found = identify(logged(3, NOISE, rows))
         assert found.fit.innovations.normalised.shape == (1, 3, rows)
-        assert compiled in (None, fit_from._cache_size())
-        compiled = fit_from._cache_size()
+        assert compiled in (None, _look._cache_size())
+        compiled = _look._cache_size()
 
 
 def test_logs_of_five_and_six_runs_share_a_shape():
@@ -81,7 +82,7 @@ def test_the_start_of_a_run_without_a_pose_is_no_unknown(poses, enough):
     runs.seen[0, : 13 - poses] = False
     point = Point(jnp.zeros(10), jnp.zeros((len(runs.seen), 5)))
     search = SimpleNamespace(point=point, local=SimpleNamespace(value=jnp.zeros(())))
-    assert bool(_regular(search, jnp.eye(10), runs)) == enough
+    assert bool(_regular(search, jnp.eye(10), runs, jnp.zeros(10, bool))) == enough
 
 
 def test_many_short_runs_get_fewer_rows_than_whole_windows():
