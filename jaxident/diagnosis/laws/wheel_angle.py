@@ -10,7 +10,6 @@ follows what the best of so many patterns brings by chance.
 from typing import NamedTuple
 
 import numpy as np
-from jax.scipy.special import gammaincc
 
 from jaxident.array_types import Array
 from jaxident.diagnosis.fit.refit import Data, Solution
@@ -211,5 +210,12 @@ def _by_chance(parts: list[Array], count: int) -> float:
     """What the best of `count` patterns brings by chance: the sum of an exponential variable for each part of a run
     that one of so many exceeds. A part of one window brings 1, whatever the pattern."""
     alone, several = (sum(len(own) == 1 for own in parts), sum(len(own) > 1 for own in parts))
-    tried = np.linspace(0.0, 40.0 + 4.0 * several, 4001)
-    return alone + float(tried[np.argmax(np.asarray(gammaincc(max(several, 1), tried)) * count < 1.0)])
+    tried = np.linspace(0.0, 40.0 + 4.0 * several, 4001)[1:]
+    return alone + float(tried[np.argmax(_exceeded(tried, max(several, 1)) * count < 1.0)])
+
+
+def _exceeded(sums: Array, count: int) -> np.ndarray:
+    """Probabilities (n,) that `count` exponential variables of mean 1 have more than some sums (n,) above 0."""
+    fewer = np.arange(count)
+    factorials = np.cumsum(np.log(np.maximum(fewer, 1)))
+    return np.sum(np.exp(fewer * np.log(sums)[:, None] - factorials - sums[:, None]), axis=1)

@@ -4,12 +4,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from jax.scipy.special import gammaincc
 
 from jaxident.diagnosis.discovery.curves import precision
 from jaxident.diagnosis.fit.refit import Data, Solution
 from jaxident.diagnosis.laws import wheel_angle
 from jaxident.diagnosis.laws.candidates import Path
 from jaxident.diagnosis.laws.wheel_angle import (
+    _exceeded,
     _explained,
     _powers,
     _Seen,
@@ -88,6 +90,12 @@ def test_kinds_that_are_searched_together_are_found_as_each_by_itself():
         assert found.half_track == pytest.approx(expected.half_track)
         np.testing.assert_allclose(np.exp(1j * found.phase), np.exp(1j * expected.phase), atol=1e-9)
     assert alone[0].power != alone[1].power
+
+
+@pytest.mark.parametrize("count", [1, 7, 400])
+def test_sums_of_exponential_variables_have_the_gamma_distribution(count):
+    sums = np.linspace(0.1, 40.0 + 4.0 * count, 200)
+    np.testing.assert_allclose(_exceeded(sums, count), gammaincc(count, sums), rtol=1e-9, atol=1e-300)
 
 
 def test_noise_alone_hardly_brings_more_than_it_may_by_chance():
