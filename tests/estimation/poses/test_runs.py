@@ -15,11 +15,17 @@ from jaxident.estimation.poses.parameters import Law, Robot, to_vector
 from jaxident.estimation.poses.prior import prior_of
 from jaxident.estimation.poses.runs import MANY, SHORT, WINDOW, rows_used, stack_runs, with_room
 from jaxident.estimation.poses.stepwise import _look
-from jaxident.log import join
+from jaxident.log import join, make_log
 from jaxident.programs import FEW, roomy
 from jaxident.robot.noise import Noise
 
 NOISE = Noise(1e-3, 1e-2)
+
+
+def blank(rows):
+    """A log of a robot that stands: no program is compiled to make it."""
+    still = np.zeros(rows)
+    return make_log(PERIOD * np.arange(rows), still, still, still, still, still)
 
 
 @pytest.mark.slow
@@ -62,7 +68,7 @@ def test_logs_of_many_lengths_share_a_program():
 
 def test_logs_of_five_and_six_runs_share_a_shape():
     logs = ([110, 195, 122, 50, 133], [195, 110, 122, 150, 133, 170])
-    each = [with_room(stack_runs(join([logged(k, rows=rows) for k, rows in enumerate(own)]))) for own in logs]
+    each = [with_room(stack_runs(join([blank(rows) for rows in own]))) for own in logs]
     assert each[0].seen.shape == each[1].seen.shape == (6, WINDOW)
     assert not each[0].seen[5].any()
 
@@ -78,7 +84,7 @@ def test_what_a_fit_tells_is_of_the_logs_own_runs_and_rows():
 @pytest.mark.parametrize(("poses", "enough"), [(13, True), (11, False)])
 def test_the_start_of_a_run_without_a_pose_is_no_unknown(poses, enough):
     """Of each pose three numbers, for ten unknowns of the robot and five starts: 39 are enough, 33 are not."""
-    runs = with_room(stack_runs(join([logged(k, NOISE, rows) for k, rows in enumerate((3, 3, 3, 2, 2))])))
+    runs = with_room(stack_runs(join([blank(rows) for rows in (3, 3, 3, 2, 2)])))
     runs.seen[0, : 13 - poses] = False
     point = Point(jnp.zeros(10), jnp.zeros((len(runs.seen), 5)))
     search = SimpleNamespace(point=point, local=SimpleNamespace(value=jnp.zeros(())))
@@ -87,7 +93,7 @@ def test_the_start_of_a_run_without_a_pose_is_no_unknown(poses, enough):
 
 def test_many_short_runs_get_fewer_rows_than_whole_windows():
     for rows, expected in ((40, 50), (50, 50), (176, 200)):
-        runs = stack_runs(join([logged(k, rows=rows) for k in range(MANY + 1)]))
+        runs = stack_runs(join([blank(rows)] * (MANY + 1)))
         padded = with_room(runs)
         assert padded.seen.shape == (roomy(MANY + 1, (MANY + 1) * expected // SHORT), expected)
         assert int(padded.seen.sum()) == int(runs.seen.sum())
@@ -96,7 +102,7 @@ def test_many_short_runs_get_fewer_rows_than_whole_windows():
 
 def test_room_is_whole_windows_half_of_short_logs_and_an_eighth_of_long_ones_at_most():
     for rows in (20, WINDOW, WINDOW + 1, 3000, 3400, 22_200, 1_000_003):
-        runs = stack_runs(logged(0, rows=20))
+        runs = stack_runs(blank(20))
         runs = jax.tree.map(lambda leaf, rows=rows: np.resize(leaf, (1, rows)) if np.ndim(leaf) else leaf, runs)
         length = with_room(runs).seen.shape[1]
         assert length % WINDOW == 0
