@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -43,10 +44,12 @@ def to_vector(effects: Sequence[Effect]) -> Array:
     """The vector (parameters,) in ORDER for a set of effects; what they do not give is neutral. KeyError for unknown
     names (`checks.check_effects` says more)."""
     given = {(effect.name, key): value for effect in effects for key, value in effect.parameters.items()}
-    if not given:
-        return jnp.asarray(NEUTRAL)
-    places = jnp.asarray([_PLACE[names] for names in given])
-    return jnp.asarray(NEUTRAL).at[places].set(jnp.stack([jnp.asarray(value, float) for value in given.values()]))
+    values, places = list(given.values()), [_PLACE[names] for names in given]
+    if any(isinstance(value, jax.Array) for value in values):  # they may be traced
+        return jnp.asarray(NEUTRAL).at[jnp.asarray(places)].set(jnp.stack([jnp.asarray(v, float) for v in values]))
+    vector = NEUTRAL.copy()
+    vector[places] = values
+    return jnp.asarray(vector)
 
 
 def by_name(vector: Array) -> Mapping[str, dict[str, Any]]:

@@ -4,7 +4,6 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 
 from jaxident.effects.effect import UNIT
@@ -74,14 +73,15 @@ def value_name(law: int, knot: int) -> str:
 
 
 def remembered(past: Past, axis: int = 0) -> dict[str, Any]:
-    """What the commands of each wheel left behind, by signal. axis: that of the time constants."""
-    each = (row for part in (past.heat, past.change, past.sense) for row in jnp.moveaxis(part, axis, 0))
+    """What the commands of each wheel left behind, by signal. axis: that of the time constants, 0 or 1."""
+    each = (row for part in (past.heat, past.change, past.sense) for row in part.swapaxes(axis, 0))
     return dict(zip([*MEMORIES, SENSE], each, strict=True))
 
 
 def directions(past: Past, axis: int = 0) -> dict[str, Any]:
-    """Directions and times since they changed, by name. axis: that of the time constants, before that of these two."""
-    direction, since = jnp.moveaxis(past.reversal, (axis + 1, axis), (0, 1))
+    """Directions and times since they changed, by name. axis: that of the time constants, 0 or 1, before that of these
+    two."""
+    direction, since = past.reversal.swapaxes(axis + 1, 0)
     return dict(zip(DIRECTIONS, direction, strict=True)) | dict(zip(REVERSALS, since, strict=True))
 
 

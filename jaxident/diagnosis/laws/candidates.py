@@ -93,7 +93,7 @@ def path_of(fit: Solution, windows: Windows) -> Path:
     rates, gain = np.exp(fit.vector[:2]), fit.vector[2:6].reshape(2, 2)
     speeds = np.stack([rates[0] * v, rates[1] * w], axis=-1) @ np.linalg.pinv(gain).T
     step, past = np.asarray(windows.step).T, _left_behind(with_room(windows._replace(laws=None)))
-    past = jax.tree.map(lambda part: part[..., : len(step)], past)
+    past = jax.tree.map(lambda part: np.asarray(part)[..., : len(step)], past)
     begin = windows.session[windows.run] + windows.t[windows.first, windows.run]
     time = begin[:, None] + np.cumsum(step, axis=1) - step
     heading = (theta + np.pi) % (2.0 * np.pi) - np.pi
