@@ -45,7 +45,7 @@ def to_vector(effects: Sequence[Effect]) -> Array:
     names (`checks.check_effects` says more)."""
     given = {(effect.name, key): value for effect in effects for key, value in effect.parameters.items()}
     values, places = list(given.values()), [_PLACE[names] for names in given]
-    if any(isinstance(value, jax.Array) for value in values):  # they may be traced
+    if any(isinstance(value, jax.Array) for value in values):  # they may be traced; else nothing is compiled
         return jnp.asarray(NEUTRAL).at[jnp.asarray(places)].set(jnp.stack([jnp.asarray(v, float) for v in values]))
     vector = NEUTRAL.copy()
     vector[places] = values

@@ -156,7 +156,7 @@ def _phases(
 def _less(pose: Array, other: Array) -> np.ndarray:
     """Poses (..., 3) less others next to them, whose headings may be told in other turns."""
     change = pose - other
-    change[..., 2] -= 2.0 * np.pi * np.round(change[..., 2] / (2.0 * np.pi))  # exact where it is small
+    change[..., 2] -= 2.0 * np.pi * np.round(change[..., 2] / (2.0 * np.pi))  # `numerics.wrap`, without a compilation
     return change
 
 

@@ -188,10 +188,10 @@ def search_from(point: Point, runs: Runs, law: Law, d_max: Array, most: int, pri
     """Walk downhill from a point until a step promises less than TOLERANCE, at most `most` steps; values and curvatures
     are those of poses and prior. Each whole step that fails halves the part of the next one that is walked, down to
     SHORTEST."""
-    free = jnp.zeros(len(names(law)), bool)
+    nothing_held = jnp.zeros(len(names(law)), bool)
 
     def body(search: Search) -> Search:
-        return advance(search, *local_at_best_deviations(search.proposed, runs, law), law, d_max, prior, free)
+        return advance(search, *local_at_best_deviations(search.proposed, runs, law), law, d_max, prior, nothing_held)
 
     return jax.lax.while_loop(lambda search: walking(search, most), body, first_search(point, law))
 

@@ -1,8 +1,8 @@
 """The estimate of `maximum_likelihood` for one log that a user waits for: the same search, step by step from Python.
 
-One program for a whole fit would take 5 to 10 s to compile for each noise law. Here all laws share the programs of a
-step and of the end. The likelihood has one with slip and one without. Both have a memory of the camera's error, which
-under a law without one has faded before the next row.
+A program of a whole fit takes 5 to 10 s to compile, for each noise law. Here all laws share the programs of a step and
+of the end. The likelihood has two, with slip and without. In both the camera's error has a memory; under a law without
+one nothing of it is left at the next row.
 """
 
 import jax
@@ -31,7 +31,8 @@ from jaxident.robot.noise import Noise
 from jaxident.robot.wheel_sensor import WheelSensor
 
 NOTHING = -100.0
-"""Logarithm of a correlation time [s] or a density of slip that is none, at any step; beyond -350 its square is 0."""
+"""Logarithm of a correlation time [s] that has passed before the next row, however soon that comes, and of a density of
+slip that is none. Below -350 their squares would be 0, and derivatives no numbers."""
 
 
 def fit_stepwise(beginning: Beginning, runs: Runs, d_max: Array, law: Law, prior: Prior) -> Fit:
@@ -57,7 +58,8 @@ def fit_stepwise(beginning: Beginning, runs: Runs, d_max: Array, law: Law, prior
 
 
 def _look_from(point: Point, runs: Runs, wide: Law, slip: bool) -> tuple[Point, Local, Innovations]:
-    """What `_look` finds at a point of a wide law, with slip or without: it then has 0 for the unknowns of slip."""
+    """What `_look` finds at a point of a wide law. Without slip it looks as a law without does, and all derivatives by
+    the unknowns of slip are 0."""
     if slip:
         return _look(point, runs, wide)
     law, shared = wide._replace(slip=False), np.array(point.shared)

@@ -23,17 +23,17 @@ def runs_with(noise, count):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["white", "slip"])
-def test_a_law_without_memory_has_the_fit_of_its_own_program(name):
+@pytest.mark.parametrize("name", ["white", "slip", "slip-ar1"])
+def test_a_fit_step_by_step_is_that_of_the_laws_own_program(name):
     """Searches end within 4e-4 standard deviations of the optimum."""
-    slip = 0.02 if name == "slip" else 0.0
-    runs = runs_with(Noise(5e-4, 5e-3, slip_along=slip, slip_heading=5.0 * slip), 3)
+    slip, time = 0.0 if name == "white" else 0.02, 0.2 if name == "slip-ar1" else None
+    runs = runs_with(Noise(5e-4, 5e-3, time, slip, 5.0 * slip), 3)
     found, law = fit_law(runs, D_MAX, name, coupling=True)
     own = fit_runs(runs, D_MAX, NOISE_LAWS[name]._replace(coupling=True))
     assert law == NOISE_LAWS[name]._replace(coupling=True)
     assert bool(found.ok)
     assert found.covariance.shape == (len(names(law)),) * 2
-    assert found.robot.noise.correlation_time is None
+    assert (found.robot.noise.correlation_time is None) == (not law.memory)
     deviation = np.sqrt(np.diagonal(own.covariance))
     apart = natural_values(found.robot, law) - natural_values(own.robot, law)
     assert np.all(np.abs(apart) < 1e-3 * deviation)
