@@ -1,5 +1,7 @@
 """`jaxident predict`."""
 
+import warnings
+
 import click
 
 from jaxident.cli.record import Recorded, origin, tell_origin, with_provenance
@@ -40,6 +42,7 @@ def command(model, log, horizon, burn_in, stride, first, last, session_time, out
     """
     start_jax()
     from jaxident.estimation.ahead.session import time_in_session
+    from jaxident.estimation.ahead.session_check import new_session
     from jaxident.estimation.predict import predict, prediction_error
     from jaxident.files.logs import read_whole
     from jaxident.files.models import load_model
@@ -55,6 +58,7 @@ def command(model, log, horizon, burn_in, stride, first, last, session_time, out
     begin = begin if session_time is None else session_time
     with working("predicting"):
         prediction = predict(robot, record, horizon, burn_in=burn_in, stride=stride, session_time=begin)
+        other = None if known or session_time is not None else new_session(robot, record, horizon, burn_in, begin)
     summary = prediction_error(prediction, record) | {"session_time": begin}
     if summary["failed"] == summary["starts"]:
         raise WorkError(f"{model}: none of {summary['starts']} predictions is finite: the model runs away on {log}")
@@ -62,6 +66,8 @@ def command(model, log, horizon, burn_in, stride, first, last, session_time, out
     write_prediction(prediction, out)
     for line in _told(summary, robot, session_time is not None, known):
         click.echo(line)
+    if other is not None:
+        warnings.warn(other, stacklevel=1)
     wrote(out)
     tell_origin(out, made)
     write_json(with_provenance(summary, made), json_file)
@@ -69,7 +75,7 @@ def command(model, log, horizon, burn_in, stride, first, last, session_time, out
 
 def _told(summary, robot, given: bool, known: bool) -> list[str]:
     """What the terminal says of predictions."""
-    from jaxident.effects.catalogue import CATALOGUE
+    from jaxident.estimation.ahead.session_check import drifts
     from jaxident.report.words import error, plain_text
 
     lines = [f"{summary['starts']} starts, {summary['compared']} of them with a pose after {summary['seconds']:.4g} s"]
@@ -83,7 +89,7 @@ def _told(summary, robot, given: bool, known: bool) -> list[str]:
         lines.append(f"{summary['run_up']} starts from a run-up of earlier commands: the filter did not converge there")
     if summary["failed"]:
         lines.append(f"{summary['failed']} predictions are not finite and count in no error")
-    if any(CATALOGUE[effect.name].timed for effect in robot.effects):
+    if drifts(robot):
         where = (
             "as told" if given else "where the model's own logs have it" if known else "right after the model's logs"
         )

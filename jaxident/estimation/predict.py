@@ -12,6 +12,7 @@ from jaxident.estimation.ahead import session
 from jaxident.estimation.ahead.beyond_range import beyond_range
 from jaxident.estimation.ahead.predict_difference import run_difference_ahead
 from jaxident.estimation.ahead.run_ahead import Ahead, run_ahead
+from jaxident.estimation.ahead.session_check import new_session
 from jaxident.estimation.ahead.stretches import Starts, every
 from jaxident.log import Log
 from jaxident.numerics import require_float64
@@ -65,7 +66,8 @@ def predict(
     begins from the state that a filter finds in the rows before (`run_ahead`); they also tell the angles of wheels that
     discovered laws go by. Where the filter does not converge, the free run begins from the speed that earlier commands
     give from rest, at the last pose. A model of free numerators is fitted to the poses of the burn-in. A UserWarning
-    tells of free runs that leave what a discovered law has seen. Needs double precision.
+    tells of free runs that leave what a discovered law has seen, and of a log whose poses say that it begins a session.
+    Needs double precision.
 
     Args:
         model: the robot.
@@ -108,9 +110,12 @@ def predict(
         check_period(model, log)
         ahead = run_difference_ahead(model, log, starts, horizon, burn_in)
     else:
-        begin = session.session_time(model, log) if session_time is None else session_time
+        begin, known = session.time_in_session(model, log, log) if session_time is None else (session_time, True)
         ahead = run_ahead(model, log, starts, horizon, burn_in=burn_in, session_time=begin)
-        for line in beyond_range(model, log, starts, ahead.pose, begin):
+        lines = beyond_range(model, log, starts, ahead.pose, begin)
+        if not known and (line := new_session(model, log, horizon, burn_in, begin)):
+            lines.append(line)
+        for line in lines:
             warnings.warn(line, stacklevel=2)
     return _flatten(log, starts, ahead)
 

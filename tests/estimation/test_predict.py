@@ -1,6 +1,7 @@
 """Free-run prediction: exact where model and data are, blind to the future, and honest about its start."""
 
 import dataclasses
+import warnings
 
 import jax
 import numpy as np
@@ -9,11 +10,12 @@ from support.records import without_poses
 
 from jaxident.effects.simulate import simulate as simulate_with_effects
 from jaxident.errors import InputError
+from jaxident.estimation.ahead.session_check import new_session
 from jaxident.estimation.poses.parameters import NAMES
 from jaxident.estimation.predict import predict, prediction_error
 from jaxident.files.models import load_model
 from jaxident.log import Log, join
-from jaxident.robot.model import Effect
+from jaxident.robot.model import Effect, Provenance
 from jaxident.robot.noise import Noise
 from jaxident.robot.simulate import simulate
 from jaxident.study.synthetic import excite
@@ -139,3 +141,22 @@ def test_what_cannot_be_predicted_says_why(log):
     delayed = dataclasses.replace(ROBOT, effects=(Effect("transport_delay", {"delay": -0.05}),))
     with pytest.raises(InputError, match="transport_delay"):
         predict(delayed, log, 5)
+
+
+@pytest.mark.parametrize("began", [0.0, 60.0])
+def test_a_log_whose_poses_begin_a_session_is_told(began):
+    """The model's logs took 60 s. A log of a later session is told of, with the option; one that goes on is not."""
+    model = dataclasses.replace(
+        ROBOT, effects=(Effect("gain_drift", {"rate": -0.005}),), provenance=Provenance(duration=60.0)
+    )
+    plain = excite(jax.random.key(3), "multilevel", 600, ROBOT.sample_period, hold=10)
+    log = Log(*(np.asarray(c) for c in simulate_with_effects(model, plain, session_time=began)))
+    line = new_session(model, log, 30, 20, 60.0)
+    assert (line is None) == (began == 60.0)
+    assert line is None or "--session-time 0 " in line
+    assert new_session(dataclasses.replace(model, effects=()), log, 30, 20, 60.0) is None
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        predict(model, log, 30)
+        predict(model, log, 30, session_time=60.0)
+    assert len(told) == (began == 0.0)

@@ -27,16 +27,13 @@ def with_session(origin: Provenance, log: Log) -> Provenance:
     return origin._replace(duration=duration, runs=runs)
 
 
-def session_time(model: Model, log: Log) -> float:
-    """Session time [s] of the first row of a log: where that run stood among those that the model was made from, or
-    else right after them."""
-    return time_in_session(model, log, log)[0]
-
-
 def time_in_session(model: Model, log: Log, part: Log) -> tuple[float, bool]:
-    """Session time [s] of the first row of a part of a log, and whether the model was made from that log."""
-    known = dict(model.provenance.runs)
-    at = {float(run.run[0]): run for run in log.runs()}[float(part.run[0])]
-    into = float(part.t[0] - at.t[0])
-    begin = known.get(mark(at))
-    return (model.provenance.duration, False) if begin is None else (begin + into, True)
+    """Session time [s] of the first row of a part of a log, and whether the model was made from that log: its runs are
+    then where they were, and those of any other log come right after them, one after the other."""
+    runs, number = log.runs(), float(part.run[0])
+    place = [float(run.run[0]) for run in runs].index(number)
+    into = float(part.t[0] - runs[place].t[0])
+    known = dict(model.provenance.runs).get(mark(runs[place]))
+    if known is not None:
+        return known + into, True
+    return model.provenance.duration + sum(float(run.t[-1] - run.t[0]) for run in runs[:place]) + into, False

@@ -16,7 +16,7 @@ from jaxident.effects.coordinates import vector_of
 from jaxident.effects.simulate import simulate as simulate_with_effects
 from jaxident.estimation.ahead.filtered_state import filter_and_run
 from jaxident.estimation.ahead.run_ahead import run_ahead
-from jaxident.estimation.ahead.session import session_time, with_session
+from jaxident.estimation.ahead.session import time_in_session, with_session
 from jaxident.estimation.ahead.stretches import Starts, cut_stretches, every
 from jaxident.estimation.online.joint_start import unsure
 from jaxident.estimation.online.joint_step import advance_belief
@@ -203,8 +203,12 @@ def test_a_log_is_known_again_in_its_session():
     runs = [make_log(np.arange(5.0), np.full(5, k), np.ones(5)) for k in range(3)]
     model = dataclasses.replace(ROBOT, provenance=with_session(Provenance(), join(runs)))
     assert model.provenance.duration == 12.0
-    assert [session_time(model, run) for run in runs] == [0.0, 4.0, 8.0]
-    assert session_time(model, runs[0]._replace(u_r=np.full(5, 9.0))) == 12.0
+    assert [time_in_session(model, run, run) for run in runs] == [(0.0, True), (4.0, True), (8.0, True)]
+    assert time_in_session(model, join(runs), join(runs)[11:]) == (9.0, True)
+    others = [run._replace(u_r=np.full(5, 9.0)) for run in runs]
+    assert time_in_session(model, others[0], others[0]) == (12.0, False)
+    late = join(others)[11:]
+    assert time_in_session(model, join(others), late) == (12.0 + 8.0 + 1.0, False)
 
 
 def test_effects_that_drift_go_by_the_session():
