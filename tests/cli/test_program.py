@@ -1,5 +1,6 @@
 """The installed program, as a user runs it: exit codes, one line for what is wrong, nothing half-written."""
 
+import dataclasses
 import json
 import os
 import re
@@ -12,7 +13,8 @@ from support.program import jaxident, refused
 
 from jaxident.cli.main import _show_warning
 from jaxident.files.logs import read_log
-from jaxident.files.models import load_model
+from jaxident.files.models import load_model, save_model
+from jaxident.robot.model import Effect, Provenance
 
 
 @pytest.fixture(scope="module")
@@ -82,6 +84,23 @@ def test_predict_writes_the_columns_of_the_contract(folder):
     ends = rows[rows[:, 2] == 30]
     index = (ends[:, 1] + 30).astype(int)
     assert np.median(np.hypot(ends[:, 4] - truth.x[index], ends[:, 5] - truth.y[index])) < 5e-3
+
+
+def test_predict_warns_where_the_poses_begin_a_session(tmp_path):
+    """A log that the robot drove from session time 0 on, and a model whose own logs took 60 s; from 3 s on the option
+    that is told says so."""
+    robot = dataclasses.replace(load_model("published"), effects=(Effect("gain_drift", {"rate": -0.005}),))
+    save_model(
+        dataclasses.replace(robot, provenance=Provenance(duration=60.0, runs=(("a", 0.0),))), tmp_path / "model.json"
+    )
+    made = jaxident("simulate", "published", "--excitation", "multilevel", "--samples", 400, "--effect",
+                    "gain_drift:rate=-0.005", "--out", tmp_path / "log.csv")  # fmt: skip
+    assert made.returncode == 0, made.stderr
+    words = ("predict", "model.json", "log.csv", "--horizon", 30, "--from", 3, "--out")
+    for name, more, told in (("a.csv", (), True), ("b.csv", ("--session-time", 3), False)):
+        found = jaxident(*words, name, *more, cwd=tmp_path)
+        assert found.returncode == 0, found.stderr
+        assert ("--session-time 3 " in found.stderr) == told
 
 
 def test_same_seed_same_log(folder):

@@ -16,8 +16,8 @@ MOST = 100
 """Starts that are looked at, spread evenly. No other number was tried."""
 FEWEST, CLEARLY = 8, 4.0
 """Starts that are needed, and standard errors by which the mean logarithm of their squares must be less: few starts
-with large errors then tell no more than others. Of 160 logs of four robots that drift, of 10 and 27 s, none that went on
-was told of, and 158 that began a session were. No others were tried."""
+with large errors then tell no more than others. Of 160 logs of four robots that drift, of 10 and 27 s, none that went
+on was told of, and 158 that began a session were. No others were tried."""
 
 
 def drifts(model: Model) -> bool:
@@ -32,21 +32,11 @@ def new_session(model: Model, log: Log, horizon: int, burn_in: int, begin: float
     duration = model.provenance.duration
     if duration == 0.0 or not drifts(model):
         return None
-    starts = every(log, burn_in, horizon)
-    ends = run_begins(log)[starts.run] + starts.row + horizon
-    inside = starts.row + horizon < np.array([len(run.t) for run in log.runs()])[starts.run]
-    measured = np.stack(log.pose, axis=1)
-    kept = np.flatnonzero(inside)[np.isfinite(measured[ends[inside]]).all(axis=1)]
-    if len(kept) < FEWEST:
+    starts, measured = _ends(log, every(log, burn_in, horizon), horizon)
+    if len(measured) < FEWEST:
         return None
-    kept = np.unique(kept[np.linspace(0, len(kept) - 1, min(MOST, len(kept))).round().astype(int)])
-    starts, measured = Starts(starts.run[kept], starts.row[kept]), measured[ends[kept]]
     told, fresh = (_missed(model, log, starts, horizon, burn_in, time, measured) for time in (begin, begin - duration))
-    scale = np.maximum(np.mean(told**2 + fresh**2, axis=0), 1e-300)
-    squares = [np.sum(missed**2 / scale, axis=1) + 1e-12 for missed in (told, fresh)]
-    apart = np.log(squares[0] / squares[1])
-    clear = np.mean(apart) > CLEARLY * np.std(apart, ddof=1) / np.sqrt(len(apart))
-    if not (clear and np.mean(squares[0]) > np.mean(squares[1])):
+    if not _clearly_less(fresh, told):
         return None
     sizes = [" and ".join(f"{1e3 * size:.3g} {unit}" for size, unit in zip(np.sqrt(np.mean(missed**2, axis=0)),
              ("mm", "mrad"), strict=True)) for missed in (fresh, told)]  # fmt: skip
@@ -55,6 +45,27 @@ def new_session(model: Model, log: Log, horizon: int, burn_in: int, begin: float
         f"{sizes[1]}. It is taken to go on at session time {begin:.4g} s; --session-time {begin - duration:.4g} (from "
         "Python session_time) takes it for a new session"
     )
+
+
+def _ends(log: Log, starts: Starts, horizon: int) -> tuple[Starts, np.ndarray]:
+    """Starts whose free runs end at a measured pose, MOST at most, and these poses (starts, 3)."""
+    ends = run_begins(log)[starts.run] + starts.row + horizon
+    inside = starts.row + horizon < np.array([len(run.t) for run in log.runs()])[starts.run]
+    poses = np.stack(log.pose, axis=1)
+    kept = np.flatnonzero(inside)[np.isfinite(poses[ends[inside]]).all(axis=1)]
+    if len(kept) > MOST:
+        kept = kept[np.linspace(0, len(kept) - 1, MOST).round().astype(int)]
+    return Starts(starts.run[kept], starts.row[kept]), poses[ends[kept]]
+
+
+def _clearly_less(own: Array, other: Array) -> bool:
+    """Whether one model misses by clearly less than another, both (starts, 2); not where one runs away."""
+    with np.errstate(all="ignore"):
+        scale = np.maximum(np.mean(own**2 + other**2, axis=0), 1e-300)
+        less, more = (np.sum(missed**2 / scale, axis=1) + 1e-12 for missed in (own, other))
+        apart = np.log(more / less)
+        clear = np.mean(apart) > CLEARLY * np.std(apart, ddof=1) / np.sqrt(len(apart))
+        return bool(clear and np.mean(more) > np.mean(less))
 
 
 def _missed(
