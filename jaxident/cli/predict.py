@@ -28,8 +28,13 @@ from jaxident.start import start_jax
 @click.option("--stride", type=rows_option, metavar="S", help="Rows from one start to the next (default: the horizon).")
 @click.option("--from", "first", type=Number(), metavar="T", help="Use the rows from this time [s] on.")
 @click.option("--to", "last", type=Number(), metavar="T", help="Use the rows up to this time [s].")
-@click.option("--session-time", type=Number(), metavar="S", help="Session time [s] at the first row of LOG, for "
-              "effects that drift (default: what the model file says of its logs).")  # fmt: skip
+@click.option(
+    "--session-time",
+    type=Number(),
+    metavar="S",
+    help="Session time [s] at the first row of LOG that is used, for effects that drift (default: where the model's "
+    "own logs have it, or right after them).",
+)
 @click.option("--out", required=True, metavar="CSV", help="The predictions to write (.csv or .csv.gz).")
 @columns_option
 @json_option
