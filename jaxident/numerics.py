@@ -7,6 +7,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from jaxident.array_types import Array, Column, Square
 
@@ -44,8 +45,10 @@ def require_float64(caller: str) -> None:
 
 
 def wrap(angle: Array) -> Array:
-    """The angle [rad] moved by whole turns into [-pi, pi]; gradient 1 everywhere."""
-    return angle - 2.0 * jnp.pi * jnp.round(angle / (2.0 * jnp.pi))
+    """The angle [rad] moved by whole turns into [-pi, pi]; gradient 1 everywhere. Of a NumPy array NumPy computes it:
+    nothing is compiled."""
+    rounded = np.round if isinstance(angle, np.ndarray) else jnp.round
+    return angle - 2.0 * np.pi * rounded(angle / (2.0 * np.pi))
 
 
 def safe_divide(numerator: Array, denominator: Array, otherwise: Array) -> Array:

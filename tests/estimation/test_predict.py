@@ -160,3 +160,19 @@ def test_a_log_whose_poses_begin_a_session_is_told(began):
         predict(model, log, 30)
         predict(model, log, 30, session_time=60.0)
     assert len(told) == (began == 0.0)
+
+
+@pytest.mark.slow
+def test_logs_that_go_on_are_not_told_of_and_those_that_begin_a_session_are():
+    """Of 20 noisy logs of 10 s each; one false line is expected in some thousands."""
+    effects, noise = (Effect("gain_drift", {"rate": 0.004, "growth": -0.03}),), Noise(5e-4, 5e-3)
+    model = dataclasses.replace(ROBOT, effects=effects, noise=noise, provenance=Provenance(duration=70.0))
+    told = {0.0: 0, 70.0: 0}
+    for key in jax.random.split(jax.random.key(5), 20):
+        plain = excite(key, "multilevel", 300, ROBOT.sample_period, hold=10)
+        for began in told:
+            made = simulate_with_effects(model, plain, key=key, session_time=began)
+            log = Log(*(None if column is None else np.asarray(column) for column in made))
+            told[began] += new_session(model, log, 30, 20, 70.0) is not None
+    assert told[70.0] == 0
+    assert told[0.0] >= 19

@@ -22,6 +22,7 @@ from jaxident.estimation.ahead.wheel_phase import closer, followed, phases_of
 from jaxident.estimation.increments.observations import blind, repeats
 from jaxident.estimation.poses.ways import ways
 from jaxident.log import Log
+from jaxident.numerics import wrap
 from jaxident.parallel import in_parallel
 from jaxident.programs import kept_program
 from jaxident.robot.model import Model
@@ -156,7 +157,7 @@ def _phases(
 def _less(pose: Array, other: Array) -> np.ndarray:
     """Poses (..., 3) less others next to them, whose headings may be told in other turns."""
     change = pose - other
-    change[..., 2] -= 2.0 * np.pi * np.round(change[..., 2] / (2.0 * np.pi))  # `numerics.wrap`, without a compilation
+    change[..., 2] = wrap(change[..., 2])
     return change
 
 

@@ -10,6 +10,7 @@ from jaxident.effects.catalogue import CATALOGUE
 from jaxident.estimation.ahead.run_ahead import run_ahead
 from jaxident.estimation.ahead.stretches import Starts, every
 from jaxident.log import Log, run_begins
+from jaxident.numerics import wrap
 from jaxident.robot.model import Model
 
 MOST = 100
@@ -61,7 +62,7 @@ def _ends(log: Log, starts: Starts, horizon: int) -> tuple[Starts, np.ndarray]:
 def _clearly_less(own: Array, other: Array) -> bool:
     """Whether one model misses by clearly less than another, both (starts, 2); not where one runs away."""
     with np.errstate(all="ignore"):
-        scale = np.maximum(np.mean(own**2 + other**2, axis=0), 1e-300)
+        scale = np.maximum(np.mean(own**2 + other**2, axis=0), 1e-300)  # data without noise may be met exactly
         less, more = (np.sum(missed**2 / scale, axis=1) + 1e-12 for missed in (own, other))
         apart = np.log(more / less)
         clear = np.mean(apart) > CLEARLY * np.std(apart, ddof=1) / np.sqrt(len(apart))
@@ -75,4 +76,4 @@ def _missed(
     plain = dataclasses.replace(model, covariance=None, parameter_order=())
     pose = run_ahead(plain, log, starts, horizon, burn_in=burn_in, session_time=session_time).pose[:, -1]
     dx, dy, turn = (measured - pose).T
-    return np.stack([np.hypot(dx, dy), (turn + np.pi) % (2.0 * np.pi) - np.pi], axis=1)
+    return np.stack([np.hypot(dx, dy), wrap(turn)], axis=1)

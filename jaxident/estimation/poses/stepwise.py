@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from jaxident.array_types import Array
-from jaxident.estimation.poses.curvature import Local, Point, at_best_deviations, sums_at
+from jaxident.estimation.poses.curvature import START_STATES, Local, Point, at_best_deviations, sums_at
 from jaxident.estimation.poses.likelihood import Innovations
 from jaxident.estimation.poses.maximum_likelihood import (
     MOST_STEPS,
@@ -39,7 +39,8 @@ def fit_stepwise(beginning: Beginning, runs: Runs, d_max: Array, law: Law, prior
     """What `fit_from` gives, as NumPy arrays."""
     wide = law._replace(memory=True, slip=True)
     kept = np.isin(names(wide), names(law))
-    held, search, goes_on = jnp.asarray(~kept), _begun(beginning, runs, wide, jnp.asarray(~kept)), True
+    held, goes_on = jnp.asarray(~kept), True
+    search = _begun(beginning, runs, wide, held)
     while goes_on:
         there, local, _ = _look_from(search.proposed, runs, wide, law.slip)
         search, goes_on = _step(search, there, local, d_max, wide, prior, held)
@@ -66,7 +67,8 @@ def _look_from(point: Point, runs: Runs, wide: Law, slip: bool) -> tuple[Point, 
     own, size = np.flatnonzero(np.isin(names(wide), names(law))), len(shared)
     there, local, found = jax.device_get(_look(point._replace(shared=shared[own]), runs, law))
     shared[own] = there.shared
-    gradient, curvature, between = np.zeros(size), np.zeros((size, size)), np.zeros((len(there.starts), size, 5))
+    gradient, curvature = np.zeros(size), np.zeros((size, size))
+    between = np.zeros((len(there.starts), size, START_STATES))
     gradient[own], curvature[np.ix_(own, own)], between[:, own] = local.gradient.shared, local.shared, local.between
     local = local._replace(gradient=local.gradient._replace(shared=gradient), shared=curvature, between=between)
     return there._replace(shared=shared), local, found
