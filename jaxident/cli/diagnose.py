@@ -146,13 +146,12 @@ def _gap(found) -> str:
     for key, name, level in (*names, *last, ("floor", "noise alone", gap.floor)):
         rows.append((name, plain_text(error(rms[key])), f"{level:.3g}"))
     lines = f"root mean square error {gap.horizon:.3g} s ahead\n{table(rows)}"
-    if gap.shrink.value is None or gap.shrink.interval is None:
+    if gap.shrink.interval is None or gap.whole.interval is None:
         return lines
-    low, high = gap.shrink.interval
-    told = f"{100 * gap.shrink.value:.0f} % ({100 * low:.0f} to {100 * high:.0f} %, 90 % interval)"
-    if not found.discovered:
-        return f"{lines}\nof the error beyond noise the corrected model takes away {told}"
-    whole = 1.0 - (gap.discovered - gap.floor) / (gap.refitted - gap.floor)
-    return (
-        f"{lines}\nof the error beyond noise named effects take away {told}; with discovered laws {100 * whole:.0f} %"
-    )
+    told = f"{lines}\nof the error beyond noise the corrected model takes away {_shrink(gap.whole)}"
+    return f"{told}; named effects alone {_shrink(gap.shrink)}" if found.discovered and found.selected else told
+
+
+def _shrink(shrink) -> str:
+    low, high = shrink.interval
+    return f"{100 * shrink.value:.0f} % ({100 * low:.0f} to {100 * high:.0f} %, 90 % interval)"

@@ -145,6 +145,8 @@ def _gap(gap: Gap) -> dict[str, Any]:
         "floor": {"value": gap.floor, "interval": list(gap.floor_interval)},
         "shrink": gap.shrink.value,
         "shrink_interval": _listed(gap.shrink.interval),
+        "whole_shrink": gap.whole.value,
+        "whole_shrink_interval": _listed(gap.whole.interval),
         "rms": _in_thousandths(gap.rms),
         "run_up": gap.run_up,
         "placebo": placebo,

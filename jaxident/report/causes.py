@@ -152,9 +152,11 @@ def shrink(found: Diagnosis) -> Section:
     """How far each effect makes the gap shrink, with the placebo."""
     gap = found.gap
     rows: dict[str, tuple[float, tuple[float, float], str]] = {}
-    chosen = _label(found.finding.selected)
+    chosen, laws = found.finding.selected, ("discovered laws",) if found.discovered else ()
     if chosen and gap.shrink.value is not None and gap.shrink.interval is not None:
-        rows[chosen] = gap.shrink.value, gap.shrink.interval, "corrected model"
+        rows[_label(chosen)] = gap.shrink.value, gap.shrink.interval, "all named effects" if laws else CORRECTED
+    if laws and gap.whole.value is not None and gap.whole.interval is not None:
+        rows[_label((*chosen, *laws))] = gap.whole.value, gap.whole.interval, CORRECTED
     weak = gap.placebo[0] if gap.placebo else ""
     for name, one in sorted(found.shrinks.items(), key=lambda pair: (pair[0] == weak, -(pair[1].value or 0.0))):
         if one.value is not None and one.interval is not None and plain(name) not in rows:
@@ -171,7 +173,8 @@ def shrink(found: Diagnosis) -> Section:
 NOTHING_TO_SHRINK = (
     "With its parameters refitted, the nominal model's error does not stand out from noise: no gap is left to shrink."
 )
-NOTHING_NAMED = "No effect is named, so none shrinks the gap. Discovered laws, if any, have a section of their own."
+NOTHING_NAMED = "No effect is named and no law is discovered, so nothing shrinks the gap."
+CORRECTED = "corrected model"
 SHRINK = (
     "0 % leaves the gap as it is after the nominal parameters are refitted, 100 % brings it down to the floor; beyond, "
     "the error came out below the floor. All on stretches that took no part in finding the effect. Intervals (90 %) "

@@ -227,7 +227,7 @@ def test_a_gap_without_a_name_is_not_called_noise():
     found = made_up("unknown")
     found = found._replace(gap=found.gap._replace(shrink=Shrink(0.0, (0.0, 0.0))), shrinks={})
     (told,) = section(diagnosis_page(found, "runs"), "How far the gap shrinks").blocks
-    assert told.startswith("No effect is named, so none shrinks the gap.")
+    assert told == "No effect is named and no law is discovered, so nothing shrinks the gap."
 
 
 def test_hidden_effects_come_first_with_the_smallest_visible_size():
@@ -316,6 +316,17 @@ def test_discovered_laws_have_a_section_a_picture_and_a_sentence():
     assert any(isinstance(block, Figure) and block.png for block in blocks)
     assert "with discovered laws" in str(section(page, "How large the gap is").blocks)
     assert blocks[-1].endswith("this may be turn loss in another form than the catalogue's.")
+
+
+def test_what_laws_take_away_besides_names_is_told_with_its_interval():
+    found = made_up("partly")
+    found = found._replace(discovered=(discovered_law(),), gap=found.gap._replace(whole=Shrink(0.97, (0.9, 1.02))))
+    (told,) = [line for line in _told(found) if "takes away" in line]
+    assert "the corrected model takes away 97 % (90 to 102 %, 90 % interval); named effects alone 38 % (" in told
+    gap = diagnosis_to_dict(found)["gap"]
+    assert (gap["whole_shrink"], gap["whole_shrink_interval"]) == (0.97, [0.9, 1.02])
+    assert gap["shrink"] == found.gap.shrink.value
+    assert "named effects alone" not in str(_told(made_up("partly")))
 
 
 def test_laws_that_the_logs_cannot_show_are_named():

@@ -60,7 +60,7 @@ def made_up(verdict: str, *, given: bool = False) -> Diagnosis:
     model = Model(0.05, Physical(np.array([2.0, 3.0]), np.ones((2, 2)), np.zeros(2)), np.array([0.1, 0.1]))
     return Diagnosis(
         verdict, _judgement(verdict, selected),
-        Gap(1.0, *levels, 1.05, (0.8, 1.3), shrink, placebo, errors, _paths(selected), floor, UNIT, 0),
+        Gap(1.0, *levels, 1.05, (0.8, 1.3), shrink, shrink, placebo, errors, _paths(selected), floor, UNIT, 0),
         account_of(1.0, _errors(errors, selected), selected, floor, UNIT), _place(gap), selected,
         [Parameter(n, 2.0 if given else None, 2.0 + 0.1 * k, 0.06) for k, n in enumerate(NOMINAL)],
         {name: 1.7**k / 10.0 for k, name in enumerate(reversed(COORDINATES))},

@@ -27,7 +27,7 @@ from jaxident.robot.model import Model
 class Gap(NamedTuple):
     """Mean squared pose error over the camera's variance at the horizon [s], three channels alike, on rows used for
     nothing else: the model as given, refitted, with the selected effects, with the discovered laws as well; the floor
-    and its 90 % interval; the shrink.
+    and its 90 % interval; the shrink by the selected effects; `whole`: by the corrected model, which has the laws, too.
     `placebo`: the shrink of an effect that nothing speaks for. errors (models, starts, 3): of these four models, as
     squares over the camera's variances `unit` (3,) [m^2, m^2, rad^2]; paths (2, starts, rows, 3): poses that the
     refitted nominal model and the last of the four predict; noise: the floor of each start; run_up: starts of the
@@ -41,6 +41,7 @@ class Gap(NamedTuple):
     floor: float
     floor_interval: tuple[float, float]
     shrink: Shrink
+    whole: Shrink
     placebo: tuple[str, Shrink] | None
     errors: Any
     paths: Any
@@ -120,7 +121,9 @@ def measure(prepared: Prepared, finding: Finding, given: Model | None, common, d
     weakest, idle = placebo_of(prepared, finding, law)
     placebo = (weakest, shrink(judge_model(idle, prepared)))
     low, high = (float(q) for q in np.quantile(floor.likely, [LOW, HIGH]))
-    gap = Gap(prepared.horizon, *_levels(errors), level, (low, high), shrink(everybody), placebo, errors,
+    by_names = shrink(everybody)
+    gap = Gap(prepared.horizon, *_levels(errors), level, (low, high), by_names,
+              by_names if shown is None else shrink(last), placebo, errors,
               np.stack([nobody.path, last.path]), floor, unit, int(last.run_up.sum()))  # fmt: skip
     moved = None
     if players and finding.unexplained <= UNEXPLAINED:
