@@ -1,10 +1,8 @@
 """Between the command that was logged and the push at the wheel. Laws of the command itself are in `commands`, those
-that remember the push in `gears`."""
+of the push in `motors`, and those that remember it in `gears`."""
 
-import jax.numpy as jnp
 import numpy as np
 
-from jaxident.array_types import Array, Wheels
 from jaxident.effects import statements
 from jaxident.effects.commands import (
     command_polling,
@@ -26,12 +24,13 @@ from jaxident.effects.effect import (
     Search,
     Suggested,
     Transform,
+    Values,
     positive,
     signed,
 )
 from jaxident.effects.gears import lag, lag_of_runs, play, play_of_runs
 from jaxident.effects.law_kinds import CHANGES, WHEELS
-from jaxident.effects.signals import Zone
+from jaxident.effects.motors import asymmetric_dead_zone, direction_gain, supply_sag
 
 OFF = 1e3
 """A saturation level far above every command, in largest commands."""
@@ -41,25 +40,13 @@ _LATE = tuple(
 """Discovered laws of a robot that follows its commands late."""
 
 
-def asymmetric_dead_zone(zone: Zone, _: Array, right: Array, left: Array) -> Zone:
-    """Widths D + a forward and D - a backward."""
-    (forward_r, forward_l), (backward_r, backward_l) = zone
-    return Zone(Wheels(forward_r + right, forward_l + left), Wheels(backward_r - right, backward_l - left))
+def _as_rates(c: Values) -> dict[str, float]:
+    rate = float(1.0 / c["inverse_rate"]) if c["inverse_rate"] > 0.0 else float("inf")
+    return {"rate": rate, "falling_ratio": float(np.exp(c["log_falling_ratio"]))}
 
 
-def direction_gain(m: Wheels, _: Wheels, __: Array, right: Array, left: Array) -> Wheels:
-    """(1 + g sign m) m: slope 1 + g forward and 1 - g backward."""
-    return Wheels(m.right + right * jnp.abs(m.right), m.left + left * jnp.abs(m.left))
-
-
-def supply_sag(m: Wheels, u: Wheels, _: Array, resistance: Array) -> Wheels:
-    """m / (1 + s (|u_r| + |u_l|)): both motors share one supply with an inner resistance."""
-    share = 1.0 / (1.0 + resistance * (jnp.abs(u.right) + jnp.abs(u.left)))
-    return Wheels(m.right * share, m.left * share)
-
-
-def _inverse(value: float) -> float:
-    return float(1.0 / value) if value > 0.0 else float("inf")
+def _as_inverses(p: Values) -> dict[str, float]:
+    return {"inverse_rate": 1.0 / p["rate"], "log_falling_ratio": float(np.log(p["falling_ratio"]))}
 
 
 def _pair(unit: str, size: float, typical: float, **more) -> tuple[Parameter, Parameter]:
@@ -145,16 +132,16 @@ RECORDS = (
     EffectRecord(
         name="input_rate_limit", site="actuation", stage="slew", step=statements.RATE_LIMIT,
         words="commands can change only so fast",
-        equation="|u'| <= R",
+        equation="|u'| <= R, or c R where u moves towards 0",
         kinds=_LATE,
         source="slew limit of motor drivers; Franklin, Powell, Emami-Naeini, ch. 9",
-        parameters=(Parameter("rate", f"{UNIT}/s", float("inf"), (1.0, 50.0), 5.0, least=0.0, above=True),),
+        parameters=(Parameter("rate", f"{UNIT}/s", float("inf"), (1.0, 50.0), 5.0, least=0.0, above=True),
+                    Parameter("falling_ratio", "", 1.0, (0.25, 4.0), 1.0, least=0.0, above=True, shape=True)),
         channels=BOTH,
         act=input_rate_limit, fast=rate_limit_by_inverse, confused_with=("motor_lag",), smooth=False,
         grid=(50.0, 20.0, 10.0, 5.0, 2.0, 1.0), sharp=True,
-        search=Search((positive("inverse_rate", 2.0),),
-                      Transform(lambda c: {"rate": _inverse(c["inverse_rate"])},
-                                lambda p: {"inverse_rate": 1.0 / p["rate"]}),
+        search=Search((positive("inverse_rate", 2.0), signed("log_falling_ratio", float(np.log(4.0)), shape=True)),
+                      Transform(_as_rates, _as_inverses),
                       lambda _: [{"inverse_rate": inverse} for inverse in (0.03, 0.07, 0.15, 0.3, 0.6)]),
     ),
     EffectRecord(

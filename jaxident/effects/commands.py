@@ -72,20 +72,32 @@ def command_polling(time: Array, offset: Array, period: Array, phase: Array) -> 
     return jnp.where(period > 0.0, (number + phase) * polls - offset, time)
 
 
-def input_rate_limit(now: Wheels, target: Wheels, elapsed: Array, rate: Array) -> Wheels:
-    """The command `elapsed` [s] after `target` was asked for, when it moves by at most `rate` [unit/s]."""
+def input_rate_limit(now: Wheels, target: Wheels, elapsed: Array, rate: Array, falling_ratio: Array) -> Wheels:
+    """The command `elapsed` [s] after `target` was asked for: it moves away from 0 by at most `rate` [unit/s], and
+    towards 0 by falling_ratio times as much. Drivers have a ramp for each."""
     limited = jnp.isfinite(rate)
-    reach = jnp.where(limited, rate, 0.0) * elapsed
-    pairs = zip(now, target, strict=True)
-    return Wheels(*(jnp.where(limited, u + jnp.clip(goal - u, -reach, reach), goal) for u, goal in pairs))
+    inverse = jnp.where(limited, 1.0 / jnp.where(limited, rate, 1.0), 0.0)
+    return _ramped(now, target, elapsed, inverse, inverse / falling_ratio)
 
 
-def rate_limit_by_inverse(now: Wheels, target: Wheels, elapsed: Array, inverse_rate: Array) -> Wheels:
+def rate_limit_by_inverse(
+    now: Wheels, target: Wheels, elapsed: Array, inverse_rate: Array, log_falling_ratio: Array
+) -> Wheels:
     """`input_rate_limit`, smooth at no limit."""
-    return Wheels(*(_towards(u, goal, elapsed, inverse_rate) for u, goal in zip(now, target, strict=True)))
+    return _ramped(now, target, elapsed, inverse_rate, inverse_rate * jnp.exp(-log_falling_ratio))
 
 
-def _towards(now: Array, goal: Array, time: Array, inverse: Array) -> Array:
-    change = goal - now
-    needed = jnp.abs(change) * inverse
-    return now + change * jnp.where(needed > time, safe_divide(time, needed, 1.0), 1.0)
+def _ramped(now: Wheels, target: Wheels, time: Array, rising: Array, falling: Array) -> Wheels:
+    """Commands on their way; rising, falling [s/unit]: the time that a unit takes."""
+    return Wheels(*(_towards(u, goal, time, rising, falling) for u, goal in zip(now, target, strict=True)))
+
+
+def _towards(now: Array, goal: Array, time: Array, rising: Array, falling: Array) -> Array:
+    lowest = jnp.clip(goal, jnp.minimum(now, 0.0), jnp.maximum(now, 0.0))  # falls as far as here, and rises from here
+    down, up = lowest - now, goal - lowest
+    needed = jnp.abs(down) * falling
+    return now + down * _done(time, needed) + up * _done(time - needed, jnp.abs(up) * rising)
+
+
+def _done(time: Array, needed: Array) -> Array:
+    return jnp.where(needed > time, safe_divide(jnp.maximum(time, 0.0), needed, 1.0), 1.0)

@@ -70,12 +70,23 @@ POLLING = Step((
     "a = pick({period} > 0.0, {period}, 1.0)",
     "time = pick({period} > 0.0, (ceil(time / a - {phase} - 1e-6) + {phase}) * a, time)",
 ))  # fmt: skip
+
+
+def _ramp(s: str, reach: str) -> str:
+    """Where a command is that can rise by `reach`: it falls from b to c, which takes as long as to rise by d."""
+    fallen = f"{{falling_ratio}} * ({reach})"
+    return (f"pick(d > {reach}, b + clip(c - b, -{fallen}, {fallen}), "
+            f"c + clip(u_{s} - c, d - {reach}, {reach} - d))")  # fmt: skip
+
+
 RATE_LIMIT = Step((
     "a = {rate} * dt",
     *(line for s in "rl" for line in (
         f"b = {{now_{s}}}",
-        f"{{now_{s}}} = b + clip(u_{s} - b, -a, a)",
-        f"u_{s} = b + clip(u_{s} - b, -0.5 * a, 0.5 * a)",
+        f"c = clip(u_{s}, clip(b, -1e300, 0.0), clip(b, 0.0, 1e300))",
+        "d = fabs(c - b) / {falling_ratio}",
+        f"{{now_{s}}} = {_ramp(s, 'a')}",
+        f"u_{s} = {_ramp(s, '0.5 * a')}",
     )),
 ), memory=("now_r", "now_l"))  # fmt: skip
 GROWN = (

@@ -57,6 +57,7 @@ def test_a_wheel_that_coasts_in_its_play():
 FORMS = [
     ("input_quantisation", {"step": 0.15}, {"towards_zero": 1.0}),
     ("input_saturation", {"level": 0.6}, {"soft": 1.0}),
+    ("input_rate_limit", {"rate": 3.0}, {"falling_ratio": 2.5}),
     ("gain_drift", {"rate": -0.02}, {"growth": 1.0}),
     ("dead_zone_drift", {"rate": 0.02}, {"growth": -1.0}),
 ]

@@ -35,10 +35,12 @@ GROUPS = {
     "rub": (("coulomb_friction", "stiction"), SHARP),
     "grip": (("traction_limit",), SMOOTH),
     "forms": (("input_quantisation", "input_saturation", "gain_drift", "dead_zone_drift"), SMOOTH),
+    "ramps": (("input_rate_limit",), 2e-4),
 }  # fmt: skip
 FORMS = {"input_quantisation": {"towards_zero": 1.0}, "input_saturation": {"soft": 1.0},
-         "gain_drift": {"growth": 0.15}, "dead_zone_drift": {"growth": -0.05}}  # fmt: skip
-"""Forms of the effects of the last group; one drift ends after 20 of 30 s."""
+         "gain_drift": {"growth": 0.15}, "dead_zone_drift": {"growth": -0.05},
+         "input_rate_limit": {"falling_ratio": 0.4}}  # fmt: skip
+"""Forms of the effects of the last groups; one drift ends after 20 of 30 s."""
 
 
 def commands(rows=ROWS, seed=0) -> np.ndarray:
@@ -68,7 +70,7 @@ def test_the_groups_hold_every_effect_that_has_statements():
 @pytest.mark.parametrize("group", GROUPS)
 def test_programs_move_as_the_simulator(group, tmp_path):
     names, bound = GROUPS[group]
-    model, u = robot(names, FORMS if group == "forms" else {}), commands()
+    model, u = robot(names, FORMS if group in ("forms", "ramps") else {}), commands()
     own = python_poses(python.write(model, model.effects), u)
     wanted = simulated(model, u)
     assert np.abs(own - wanted).max() < bound

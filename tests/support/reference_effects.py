@@ -105,8 +105,9 @@ class Robot:
         limit = self.of("input_rate_limit", "rate", math.inf)
         if math.isinf(limit):
             return self.target
-        reach = limit * (time - self.begin)
-        return self.command + np.clip(self.target - self.command, -reach, reach)
+        falls = limit * self.of("input_rate_limit", "falling_ratio", 1.0)
+        return np.array([ramped(*pair, time - self.begin, limit, falls)
+                         for pair in zip(self.command, self.target, strict=True)])  # fmt: skip
 
     def pushes(self, time):
         """What each motor gives, before play and lag."""
@@ -268,6 +269,17 @@ class Robot:
             half = 0.5 * self.of("backlash", side)
             new[P_R + wheel] = min(max(new[P_R + wheel], -half), half)
         return new
+
+
+def ramped(command, target, time, rises, falls):
+    """Where a command is that moves away from 0 by `rises` a second, and towards 0 by `falls`."""
+    if command < 0.0:
+        return -ramped(-command, -target, time, rises, falls)
+    if target >= command:
+        return min(command + rises * time, target)
+    lowest = max(target, 0.0)
+    left = time - (command - lowest) / falls
+    return command - falls * time if left < 0.0 else max(lowest - rises * left, target)
 
 
 def polled(effects, arrivals, offset):

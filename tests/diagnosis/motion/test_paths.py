@@ -86,6 +86,7 @@ FORMS = [
     ("backlash", {"coasting": 1.0}),
     ("input_quantisation", {"towards_zero": 1.0}),
     ("input_saturation", {"soft": 1.0}),
+    ("input_rate_limit", {"falling_ratio": 2.5}),
     ("gain_drift", {"growth": 0.5}),
     ("dead_zone_drift", {"growth": -0.5}),
     ("traction_limit", {"dry": 1.0}),
