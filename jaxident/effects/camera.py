@@ -44,29 +44,31 @@ def heading_offset(pose: Pose, offset: Array) -> Pose:
     return pose._replace(theta=pose.theta + offset)
 
 
-def lens_distortion(pose: Pose, strength: Array, centre_x: Array, centre_y: Array) -> Pose:
-    """p -> c + (p - c) (1 + k |p - c|^2), Brown 1966's first radial term."""
+def lens_distortion(pose: Pose, strength: Array, centre_x: Array, centre_y: Array, edge: Array) -> Pose:
+    """p -> c + (p - c) (1 + k r^2 (1 + e r^2)), r = |p - c|: the first two radial terms of Brown 1966, k and k e."""
     dx, dy = pose.x - centre_x, pose.y - centre_y
-    stretch = strength * (dx * dx + dy * dy)
+    square = dx * dx + dy * dy
+    stretch = strength * square * (1.0 + edge * square)
     return pose._replace(x=pose.x + stretch * dx, y=pose.y + stretch * dy)
 
 
-def lens_by_pulls(pose: Pose, strength: Array, pull_x: Array, pull_y: Array) -> Pose:
+def lens_by_pulls(pose: Pose, strength: Array, pull_x: Array, pull_y: Array, edge: Array) -> Pose:
     """`lens_distortion` by the products of strength and centre: of strength and centre many pairs bend the field nearly
     alike, of these numbers few."""
-    return lens_distortion(pose, strength, *(safe_divide(pull, strength, 0.0) for pull in (pull_x, pull_y)))
+    return lens_distortion(pose, strength, *(safe_divide(pull, strength, 0.0) for pull in (pull_x, pull_y)), edge)
 
 
 def _to_lens(coordinates) -> dict[str, float]:
     strength = float(coordinates["strength"])
     x, y = (float(coordinates[key]) / strength if strength else 0.0 for key in ("pull_x", "pull_y"))
-    return {"strength": strength, "centre_x": x, "centre_y": y}
+    return {"strength": strength, "centre_x": x, "centre_y": y, "edge": float(coordinates["edge"])}
 
 
 def _from_lens(parameters) -> dict[str, float]:
     strength = parameters["strength"]
     pulls = (strength * parameters.get(key, 0.0) for key in ("centre_x", "centre_y"))
-    return {"strength": strength, **dict(zip(("pull_x", "pull_y"), pulls, strict=True))}
+    named = dict(zip(("pull_x", "pull_y"), pulls, strict=True))
+    return {"strength": strength, **named, "edge": parameters.get("edge", 0.0)}
 
 
 def camera_tilt(pose: Pose, along_x: Array, along_y: Array) -> Pose:
@@ -156,15 +158,17 @@ RECORDS = (
     EffectRecord(
         name="lens_distortion", site="camera", stage="optics", step=statements.LENS,
         words="the camera's lens bends the picture",
-        equation="p -> c + (p - c) (1 + k |p - c|^2)",
+        equation="p -> c + (p - c) (1 + k r^2 (1 + e r^2)), r = |p - c|",
         source="Brown 1966, Decentering distortion of lenses, Photogrammetric Engineering 32",
         parameters=(Parameter("strength", "1/m^2", 0.0, (-0.1, 0.1), 0.05),
                     Parameter("centre_x", "m", 0.0, (-3.0, 3.0), 0.0, shape=True),
-                    Parameter("centre_y", "m", 0.0, (-3.0, 3.0), 0.0, shape=True)),
+                    Parameter("centre_y", "m", 0.0, (-3.0, 3.0), 0.0, shape=True),
+                    Parameter("edge", "1/m^2", 0.0, (-1.0, 10.0), 0.0, shape=True)),
         channels=(ALONG, LATERAL),
         act=lens_distortion, fast=lens_by_pulls, rank=-1, confused_with=("camera_scale",),
         search=Search((signed("strength", 2.0), Coordinate("pull_x", 0.0, -5.0, 5.0, 0.1, silent=True),
-                       Coordinate("pull_y", 0.0, -5.0, 5.0, 0.1, silent=True)), Transform(_to_lens, _from_lens),
+                       Coordinate("pull_y", 0.0, -5.0, 5.0, 0.1, silent=True),
+                       Coordinate("edge", 0.0, -5.0, 25.0, 1.0, shape=True)), Transform(_to_lens, _from_lens),
                       suggested=Suggested("places", lambda x, y: {
                           "strength": CENTRAL, "pull_x": CENTRAL * x, "pull_y": CENTRAL * y})),
     ),

@@ -153,7 +153,8 @@ SCALE = Step(("x = x * (1.0 + 0.5 * {difference})", "y = y * (1.0 - 0.5 * {diffe
 LENS = Step((
     "a = x - {centre_x}",
     "b = y - {centre_y}",
-    "c = {strength} * (a * a + b * b)",
+    "c = a * a + b * b",
+    "c = {strength} * c * (1.0 + {edge} * c)",
     "x = x + c * a",
     "y = y + c * b",
 ))  # fmt: skip

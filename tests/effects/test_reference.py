@@ -60,6 +60,7 @@ FORMS = [
     ("input_rate_limit", {"rate": 3.0}, {"falling_ratio": 2.5}),
     ("gain_drift", {"rate": -0.02}, {"growth": 1.0}),
     ("dead_zone_drift", {"rate": 0.02}, {"growth": -1.0}),
+    ("lens_distortion", {"strength": 0.2, "centre_x": 0.2}, {"edge": 2.0}),
 ]
 
 

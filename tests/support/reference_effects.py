@@ -329,9 +329,10 @@ def camera(effects, t, rows, rng):
     x = x + marker["ahead"] * np.cos(theta) - marker["left"] * np.sin(theta)
     y = y + marker["ahead"] * np.sin(theta) + marker["left"] * np.cos(theta)
     theta = theta + effects.get("heading_offset", {}).get("offset", 0.0)
-    lens = {"strength": 0.0, "centre_x": 0.0, "centre_y": 0.0} | effects.get("lens_distortion", {})
+    lens = {"strength": 0.0, "centre_x": 0.0, "centre_y": 0.0, "edge": 0.0} | effects.get("lens_distortion", {})
     out_x, out_y = x - lens["centre_x"], y - lens["centre_y"]
-    factor = 1.0 + lens["strength"] * np.hypot(out_x, out_y) ** 2
+    away = np.hypot(out_x, out_y)
+    factor = 1.0 + lens["strength"] * (away**2 + lens["edge"] * away**4)
     x, y = lens["centre_x"] + factor * out_x, lens["centre_y"] + factor * out_y
     tilt = {"along_x": 0.0, "along_y": 0.0} | effects.get("camera_tilt", {})
     depth = 1.0 + tilt["along_x"] * x + tilt["along_y"] * y

@@ -35,9 +35,10 @@ patterns than a short one. No other number was tried."""
 NARROW = 4.0
 """Steps go by how far nine windows of ten go. If one goes more than NARROW times as far, they go by a part of that: a
 robot that mostly stands would ask for thousands of patterns. No other was tried."""
-ZOOMS, AROUND = 4, np.linspace(-1.0, 1.0, 5)
+ZOOMS, AROUND = 5, np.linspace(-1.0, 1.0, 5)
 """Times that the search looks closer, and where then, in steps of the grid before; the next grid is half as wide. From
--2 to 2 steps the same was found on 180 simulated logs."""
+-2 to 2 steps the same was found on 180 simulated logs. Four times left the period of a loud pattern off by 0.3 %, five
+by 0.001 %."""
 
 
 class _Seen(NamedTuple):

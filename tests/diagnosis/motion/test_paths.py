@@ -89,6 +89,7 @@ FORMS = [
     ("input_rate_limit", {"falling_ratio": 2.5}),
     ("gain_drift", {"growth": 0.5}),
     ("dead_zone_drift", {"growth": -0.5}),
+    ("lens_distortion", {"edge": 0.8}),
     ("traction_limit", {"dry": 1.0}),
     ("traction_limit", {"dry": 1.0, "spin": 0.03}),
 ]
