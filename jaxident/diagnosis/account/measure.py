@@ -121,9 +121,7 @@ def measure(prepared: Prepared, finding: Finding, given: Model | None, common, d
     weakest, idle = placebo_of(prepared, finding, law)
     placebo = (weakest, shrink(judge_model(idle, prepared)))
     low, high = (float(q) for q in np.quantile(floor.likely, [LOW, HIGH]))
-    by_names = shrink(everybody)
-    gap = Gap(prepared.horizon, *_levels(errors), level, (low, high), by_names,
-              by_names if shown is None else shrink(last), placebo, errors,
+    gap = Gap(prepared.horizon, *_levels(errors), level, (low, high), shrink(everybody), shrink(last), placebo, errors,
               np.stack([nobody.path, last.path]), floor, unit, int(last.run_up.sum()))  # fmt: skip
     moved = None
     if players and finding.unexplained <= UNEXPLAINED:
