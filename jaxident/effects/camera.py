@@ -55,7 +55,8 @@ def lens_distortion(pose: Pose, strength: Array, centre_x: Array, centre_y: Arra
 def lens_by_pulls(pose: Pose, strength: Array, pull_x: Array, pull_y: Array, edge: Array) -> Pose:
     """`lens_distortion` by the products of strength and centre: of strength and centre many pairs bend the field nearly
     alike, of these numbers few."""
-    return lens_distortion(pose, strength, *(safe_divide(pull, strength, 0.0) for pull in (pull_x, pull_y)), edge)
+    x, y = (safe_divide(pull, strength, 0.0) for pull in (pull_x, pull_y))
+    return lens_distortion(pose, strength, x, y, edge)
 
 
 def _to_lens(coordinates) -> dict[str, float]:

@@ -14,8 +14,8 @@ How to add an effect
    slew         (now, target, elapsed, **values) -> Wheels       the command, `elapsed` [s] after it was `now`
    zone         (zone, time, **values) -> Zone                   widths of the dead zones at a session time
    motor        (m, u, time, **values) -> Wheels                 pushes m of commands u at a session time
-   gear         (push, memory, substep, **values) ->             pushes over a substep; memory is Wheels, 0 at rest
-                (Push, memory)
+   gear         (push, memory, substep, **values) ->             pushes over a substep; memory is Wheels or a
+                (Push, memory)                                   tuple of them (`memory`), 0 at rest
    friction     (n, **values) -> Wheels                          levels of dry friction at wheel speeds n
    grip         `Grip`: two functions                            what the ground takes of each wheel's push
    body         (motion, **values) -> Force                      accelerations of the whole robot
@@ -192,10 +192,10 @@ class EffectRecord(NamedTuple):
     smooth: whether the simulation has a derivative by the parameters at neutral; where not, `grid` holds values of the
     first parameter to try instead. sharp: it has corners within a sample. varies: it changes while the command is held.
     timed: it goes by session time. extension: beyond the catalogue that this program was asked for. step: its law as
-    statements for programs without this package; None where it draws. quantity: what simulators and controllers call
-    it, where one of them has a word for it (`jaxident.export`). kinds: discovered laws (acts on, times, signals) in
-    whose place it acts, so that one found there may be this effect in another form. poses_only: it acts on the camera's
-    clock; wheel speeds are without it, and no log without them is searched for it. All have `search` or `chance`.
+    statements for programs without this package; None where it draws. memory: how many numbers of each wheel a law of
+    stage `gear` remembers. quantity: what simulators call it (`jaxident.export`). kinds: discovered laws (acts on,
+    times, signals) in whose place it acts, so that one found there may be this effect in another form. poses_only: it
+    acts on the camera's clock; no log without wheel speeds is searched for it. All have `search` or `chance`.
     """
 
     name: str
@@ -219,6 +219,7 @@ class EffectRecord(NamedTuple):
     timed: bool = False
     extension: bool = False
     step: Step | None = None
+    memory: int = 1
     quantity: str = ""
     kinds: tuple[tuple[str, ...], ...] = ()
     poses_only: bool = False
@@ -235,7 +236,7 @@ class EffectRecord(NamedTuple):
     @property
     def law(self) -> Any:
         """Its law in the coordinates of the search."""
-        return self.act if self.fast is None else self.fast
+        return self.fast or self.act
 
     def neutral(self) -> dict[str, float]:
         """Parameters at which it does nothing, by name."""
@@ -243,7 +244,5 @@ class EffectRecord(NamedTuple):
 
     def typical(self, duration: float | None = None) -> dict[str, Any]:
         """Parameters of a clear but not extreme case, by name, for a session of some duration [s]."""
-        return {
-            parameter.name: 0.5 * duration if parameter.instant and duration is not None else parameter.typical
-            for parameter in self.parameters
-        }
+        middle = None if duration is None else 0.5 * duration
+        return {p.name: p.typical if middle is None or not p.instant else middle for p in self.parameters}

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 from jaxident.array_types import Array, Wheels
 from jaxident.effects.effect import EffectRecord
 from jaxident.effects.signals import Push, Substep
-from jaxident.effects.stages import CHAIN, INPUT, acting, static_push
+from jaxident.effects.stages import CHAIN, INPUT, acting, remembered_at_rest, static_push
 from jaxident.numerics import safe_divide
 from jaxident.robot.drive import Physical, force, wheel_speeds
 
@@ -211,4 +211,4 @@ def scanned(effect: EffectRecord, asked: Push, drive: Physical, size: Array, **v
         return (memory, v, w), [jnp.stack(part, axis=-1) for part in passed]
 
     still = jnp.zeros_like(asked.mean[0, :, 0])
-    return Push(*jax.lax.scan(body, (Wheels(still, still), still, still), (*asked, size))[1])
+    return Push(*jax.lax.scan(body, (remembered_at_rest(effect, still), still, still), (*asked, size))[1])

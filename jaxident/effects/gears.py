@@ -72,9 +72,12 @@ def play_of_runs(push: Push, drive: Physical, step: Array, right: Array, left: A
     return Push(coasts + driving * turning, driving * push.slope + 6.0 * free * driving * turning)
 
 
-def motor_lag(last: Array, m: Array, step: Array, time_constant: Array) -> tuple[Array, Array, Array, Array]:
-    """q' = (m - q) / tau over a step of held m: q at its end, mean of q, its slope (12 times the first moment about
-    the middle, so that mean + slope (s - 1/2) has both moments of q), and the part of q that kept its start."""
+def motor_lag(last: Array, mean: Array, slope: Array, step: Array, time_constant: Array) -> tuple[Array, Array, Array]:
+    """q' = (m - q) / tau over a step of m = mean + slope (s - 1/2), s in [0, 1]: q at its end, the mean of q, and its
+    slope (12 times the first moment about the middle, so that mean + slope (s - 1/2) has both moments of q).
+
+    A steady rise is followed late by slope tau / step; what is left of the gap at the start fades.
+    """
     lagging = time_constant > 0.0
     decay, once, twice = hold_integrals(1.0 / jnp.where(lagging, time_constant, 1.0), step)
     kept = safe_divide(once, step, 1.0)
@@ -83,31 +86,45 @@ def motor_lag(last: Array, m: Array, step: Array, time_constant: Array) -> tuple
     still = jnp.where(step > 0.0, 0.0, 1.0)  # no time, no change: else a step of length zero would hide a switch
     limits = (decay, still), (kept, first), (moment, -0.5 * first)
     decay, kept, moment = (jnp.where(lagging, value, limit) for value, limit in limits)
-    gap = last - m
-    return m + gap * decay, m + gap * kept, 12.0 * moment * gap, kept
+    behind = slope * first
+    gap = last - (mean - 0.5 * slope - behind)
+    return mean + 0.5 * slope - behind + gap * decay, mean - behind + gap * kept, slope + 12.0 * moment * gap
 
 
-def lag(push: Push, memory: Wheels, now: Substep, time_constant: Array) -> tuple[Push, Wheels]:
-    """What passes the lag of both motors; memory: what passed at last. The slope of its input passes as far as the lag
-    follows within the substep."""
-    means, slopes, ends = [], [], []
-    for wheel in range(2):
-        end, mean, slope, kept = motor_lag(memory[wheel], push.mean[wheel], now.step, time_constant)
-        means.append(mean)
-        slopes.append(slope if push.slope is None else slope + (1.0 - kept) * push.slope[wheel])
-        ends.append(jnp.asarray(end))
-    return Push(Wheels(*means), Wheels(*slopes)), Wheels(*ends)
+def lag(
+    push: Push, memory: tuple[Wheels, Wheels], now: Substep, time_constant: Array, second_pole: Array
+) -> tuple[Push, tuple[Wheels, Wheels]]:
+    """What passes the lag of both motors, one pole and then another (`second_pole`: its part of the time constant);
+    memory: what passed each at last."""
+    push, first = one_pole(push, memory[0], now.step, (1.0 - second_pole) * time_constant)
+    push, second = one_pole(push, memory[1], now.step, second_pole * time_constant)
+    return push, (first, second)
 
 
-def lag_of_runs(push: Push, _: Physical, step: Array, time_constant: Array) -> Push:
-    """`lag` over whole runs (points, runs, 2), steps (points, runs, 1) [s]; it is linear, so that the response to a
-    unit gap serves every substep."""
-    decay, average, rising, kept = motor_lag(jnp.ones_like(step), jnp.zeros_like(step), step, time_constant)
+def one_pole(push: Push, memory: Wheels, step: Array, time_constant: Array) -> tuple[Push, Wheels]:
+    """What passes one lag of both wheels."""
+    slope = Wheels(0.0, 0.0) if push.slope is None else push.slope
+    wheels = zip(memory, push.mean, slope, strict=True)
+    passed = [motor_lag(last, mean, rise, step, time_constant) for last, mean, rise in wheels]
+    ends, means, slopes = (Wheels(*(jnp.asarray(part) for part in pair)) for pair in zip(*passed, strict=True))
+    return Push(means, slopes), ends
+
+
+def lag_of_runs(push: Push, _: Physical, step: Array, time_constant: Array, second_pole: Array) -> Push:
+    """`lag` over whole runs (points, runs, 2), steps (points, runs, 1) [s]."""
+    first = _pole_of_runs(push, step, (1.0 - second_pole) * time_constant)
+    return _pole_of_runs(first, step, second_pole * time_constant)
+
+
+def _pole_of_runs(push: Push, step: Array, time_constant: Array) -> Push:
+    """`one_pole` over whole runs; it is linear, so that the response to a unit gap serves every substep."""
+    none = jnp.zeros_like(step)
+    decay, average, rising = motor_lag(jnp.ones_like(step), none, none, step, time_constant)
+    goal, half = push.mean - push.slope * safe_divide(time_constant, step, 0.0), 0.5 * push.slope
 
     def body(last, now):
-        goal, own = now
-        return goal + (last - goal) * own, last
+        begin, end, own = now
+        return end + (last - begin) * own, last - begin
 
-    last = jax.lax.scan(body, jnp.zeros_like(push.mean[0]), (push.mean, decay))[1]
-    gap = last - push.mean
-    return Push(push.mean + gap * average, gap * rising + (1.0 - kept) * push.slope)
+    gap = jax.lax.scan(body, jnp.zeros_like(push.mean[0]), (goal - half, goal + half, decay))[1]
+    return Push(goal + gap * average, push.slope + gap * rising)

@@ -7,11 +7,9 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import jax.numpy as jnp
-
 from jaxident.array_types import Array, Wheels
 from jaxident.effects.signals import Push, Substep
-from jaxident.effects.stages import CHAIN, acting, static_push
+from jaxident.effects.stages import CHAIN, acting, remembered_at_rest, static_push
 
 NODES = (0.5 - math.sqrt(1.0 / 12.0), 0.5 + math.sqrt(1.0 / 12.0))
 """Gauss-Legendre rule on [0, 1] with two nodes of weight 1/2: mean and first moment of a cubic are exact."""
@@ -26,8 +24,9 @@ class Memory(NamedTuple):
 
 def at_rest(settings, like: Array) -> Memory:
     """Nothing commanded, nothing moving, the gears in the middle of their play."""
-    still = Wheels(jnp.zeros_like(like), jnp.zeros_like(like))
-    return Memory(*(tuple(still for _ in acting(stage, settings)) for stage in ("slew", "gear")))
+    return Memory(*(
+        tuple(remembered_at_rest(effect, like) for effect, _ in acting(stage, settings)) for stage in ("slew", "gear")
+    ))  # fmt: skip
 
 
 def push(

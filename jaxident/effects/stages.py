@@ -71,6 +71,12 @@ def seen(settings: Settings, pose: Pose, *, fast: bool = False) -> Pose:
     return pose
 
 
+def remembered_at_rest(effect: EffectRecord, like: Array) -> Any:
+    """What a law of stage `gear` remembers of a robot at rest."""
+    still = Wheels(jnp.zeros_like(like), jnp.zeros_like(like))
+    return still if effect.memory == 1 else (still,) * effect.memory
+
+
 def friction_level(settings: Settings, n: Wheels) -> Wheels:
     """The level of dry friction of both wheels, sliding at speeds n: the sum over all laws, >= 0."""
     right, left = jnp.zeros_like(n.right), jnp.zeros_like(n.left)

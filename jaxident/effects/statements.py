@@ -113,16 +113,25 @@ GAIN_DRIFT = Step((
     "m_r = m_r * a",
     "m_l = m_l * a",
 ))  # fmt: skip
-LAG = Step((
-    "a = pick({time_constant} > 0.0, {time_constant}, 1.0)",
-    "b = pick({time_constant} > 0.0, exp(-dt / a), 0.0)",
-    "c = pick({time_constant} > 0.0, a / dt * (1.0 - b), 0.0)",
-    *(line for s in "rl" for line in (
-        f"d = {{q_{s}}} - m_{s}",
-        f"{{q_{s}}} = m_{s} + d * b",
-        f"m_{s} = m_{s} + d * c",
-    )),
-), memory=("q_r", "q_l"))  # fmt: skip
+
+
+def _pole(time_constant: str, memory: str) -> tuple[str, ...]:
+    return (
+        f"a = {time_constant}",
+        "b = pick(a > 0.0, exp(-dt / pick(a > 0.0, a, 1.0)), 0.0)",
+        "c = a / dt * (1.0 - b)",
+        *(line for s in "rl" for line in (
+            f"d = {{{memory}_{s}}} - m_{s}",
+            f"{{{memory}_{s}}} = m_{s} + d * b",
+            f"m_{s} = m_{s} + d * c",
+        )),
+    )  # fmt: skip
+
+
+LAG = Step(
+    (*_pole("{time_constant} * (1.0 - {second_pole})", "q"), *_pole("{time_constant} * {second_pole}", "s")),
+    memory=("q_r", "q_l", "s_r", "s_l"),
+)
 PLAY = Step(tuple(line for s, width in zip("rl", ("{right}", "{left}"), strict=True) for line in (
     f"a = {{coasting}} * n_{s}",
     f"b = m_{s} - a",

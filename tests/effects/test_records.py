@@ -181,7 +181,8 @@ contact.RECORDS += (EffectRecord(
 actuation.RECORDS += (EffectRecord(
     "second_lag", "actuation", "gear", "one more lag", "q' = (m - q) / tau",
     (Parameter("tau", "s", 0.0, (0.0, 0.3), 0.05, least=0.0),), BOTH, "a filter in the driver",
-    lambda push, memory, now, tau: gears.lag(push, memory, now, tau), search=Search((positive("tau", 0.5),))),)
+    lambda push, memory, now, tau: gears.one_pole(push, memory, now.step, tau),
+    search=Search((positive("tau", 0.5),))),)
 from jaxident.effects.apply import with_effects
 from jaxident.effects.coordinates import by_effect, vector_of
 from jaxident.effects.fast_motion import report

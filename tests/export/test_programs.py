@@ -35,11 +35,12 @@ GROUPS = {
     "rub": (("coulomb_friction", "stiction"), SHARP),
     "grip": (("traction_limit",), SMOOTH),
     "forms": (("input_quantisation", "input_saturation", "gain_drift", "dead_zone_drift"), SMOOTH),
-    "ramps": (("input_rate_limit", "lens_distortion"), 2e-4),
+    "ramps": (("input_rate_limit", "motor_lag", "lens_distortion"), 2e-4),
 }  # fmt: skip
 FORMS = {"input_quantisation": {"towards_zero": 1.0}, "input_saturation": {"soft": 1.0},
          "gain_drift": {"growth": 0.15}, "dead_zone_drift": {"growth": -0.05},
-         "input_rate_limit": {"falling_ratio": 0.4}, "lens_distortion": {"edge": 0.3}}  # fmt: skip
+         "input_rate_limit": {"falling_ratio": 0.4}, "lens_distortion": {"edge": 0.3},
+         "motor_lag": {"second_pole": 0.5}}  # fmt: skip
 """Forms of the effects of the last groups; one drift ends after 20 of 30 s."""
 
 

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-X, Y, THETA, V, W, Q_R, Q_L, P_R, P_L, E_R, E_L = range(11)
+X, Y, THETA, V, W, Q_R, Q_L, P_R, P_L, E_R, E_L, S_R, S_L = range(13)
 TINY = 1e-12
 
 
@@ -28,7 +28,7 @@ def simulate_reference(parameters, effects, t, u_r, u_l, start, *, session_time=
     shown = np.asarray(t, float) - effects.get("camera_latency", {}).get("delay", 0.0)  # what the frames of t show
     stops = np.unique(np.concatenate([shown, arrivals, [change]]))
     stops = stops[(stops >= shown[0]) & (stops <= shown[-1])]
-    state, rows = np.array([*start, *[0.0] * 6]), [start[:3]]
+    state, rows = np.array([*start, *[0.0] * 8]), [start[:3]]
     for begin, end in itertools.pairwise(stops):
         middle = 0.5 * (begin + end)
         index = np.searchsorted(arrivals, middle) - 1
@@ -56,6 +56,7 @@ class Robot:
         self.command, self.begin, self.target, self.changed = np.zeros(2), 0.0, np.zeros(2), False
         self.slides = [0, 0]
         self.lag = self.of("motor_lag", "time_constant")
+        self.second = self.of("motor_lag", "second_pole")
         self.coulomb = [self.of("coulomb_friction", side) for side in ("right", "left")]
         self.static = [self.of("stiction", side) for side in ("right", "left")]
         self.rubs = any(self.coulomb) or any(self.static)
@@ -249,13 +250,16 @@ class Robot:
             acceleration = acceleration - self.lightness() * self.gain @ friction
         theta, v, w = state[THETA], state[V], state[W]
         side = -self.of("lateral_slip", "slip") * v * w
-        ds = np.zeros(11)
+        ds = np.zeros(len(state))
         ds[X] = v * math.cos(theta) - side * math.sin(theta)
         ds[Y] = v * math.sin(theta) + side * math.cos(theta)
         ds[THETA] = w
         ds[[V, W]] = acceleration
         if self.lag > 0.0:
-            ds[[Q_R, Q_L]] = (push - state[[Q_R, Q_L]]) / self.lag
+            between = push if self.second == 0.0 else state[[S_R, S_L]]
+            ds[[Q_R, Q_L]] = (between - state[[Q_R, Q_L]]) / (self.lag * (1.0 - self.second))
+            if self.second > 0.0:
+                ds[[S_R, S_L]] = (push - state[[S_R, S_L]]) / (self.lag * self.second)
         ds[[P_R, P_L]] = self.pushes(now) - self.coasting(state)
         return ds
 
