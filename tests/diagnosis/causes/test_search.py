@@ -176,6 +176,22 @@ def test_an_effect_in_the_wrong_form_takes_the_other(true, begun):
     assert len(moves) == 2 or name == STEPS, "which goes to the best step of the wrong form first"
 
 
+@pytest.mark.parametrize(
+    "true",
+    [{("input_rate_limit", "inverse_rate"): 0.3, ("input_rate_limit", "log_falling_ratio"): 0.7},
+     {LAG: 0.15, ("motor_lag", "second_pole"): 0.35},
+     {("lens_distortion", "strength"): 1.5, ("lens_distortion", "edge"): 3.0}],
+    ids=["ramps", "poles", "edge"],
+)  # fmt: skip
+def test_a_form_that_is_a_number_is_fitted(true):
+    (size, shape), (name, *_) = true.items(), next(iter(true))
+    data, fit = fitted(windows_of(robot_with(true)), (name,), {size[0]: size[1]})
+    for pair, value in (size, shape):
+        deviation = np.sqrt(fit.covariance[fit.places.index(PLACES[pair])][fit.places.index(PLACES[pair])])
+        assert deviation < 0.2 * value
+        assert abs(fit.vector[PLACES[pair]] - value) < 4.0 * deviation
+
+
 def test_a_set_that_was_refitted_is_not_tried_again_nor_one_that_the_catalogue_lacks(lagging):
     data, fit = fitted(lagging, ("transport_delay",), {DELAY: 0.1})
     now = stands(fit, ("transport_delay",))
