@@ -158,14 +158,14 @@ RECORDS = (
     EffectRecord(
         name="motor_lag", site="actuation", stage="gear", step=statements.LAG, quantity="lag",
         words="the motors take time to follow",
-        equation="q' = (m - q) / tau, gain q in place of gain m; or two such laws of (1 - p) tau and p tau",
+        equation="m = q + tau q' + e tau^2 q'' / 4, gain q in place of gain m",
         kinds=_LATE,
         source="inductance and speed loop; Franklin, Powell, Emami-Naeini, ch. 2",
         parameters=(Parameter("time_constant", "s", 0.0, (0.0, 0.3), 0.06, least=0.0),
-                    Parameter("second_pole", "", 0.0, (0.0, 0.5), 0.0, least=0.0, most=0.5, shape=True)),
+                    Parameter("second_order", "", 0.0, (0.0, 1.0), 0.0, least=0.0, most=1.0, shape=True)),
         channels=BOTH,
         act=lag, fast=lag_of_runs, memory=2, rank=1, confused_with=("transport_delay",),
-        search=Search((positive("time_constant", 0.5), positive("second_pole", 0.5, shape=True))),
+        search=Search((positive("time_constant", 0.5), positive("second_order", 1.0, shape=True))),
     ),
     EffectRecord(
         name="backlash", site="actuation", stage="gear", step=statements.PLAY,

@@ -12,6 +12,9 @@ from jaxident.effects.signals import Push, Substep
 from jaxident.numerics import hold_integrals, safe_divide
 from jaxident.robot.drive import Physical, force, wheel_speeds
 
+TOGETHER = 1e-12
+"""Square of the least distance of two poles, as a part of their sum: where they meet, the root has no derivative."""
+
 
 def backlash(position: Array, turning: Array, step: Array, width: Array) -> tuple[Array, Array]:
     """New position in the play and the part of the step [0, 1] that passed before the gear drives again.
@@ -92,13 +95,19 @@ def motor_lag(last: Array, mean: Array, slope: Array, step: Array, time_constant
 
 
 def lag(
-    push: Push, memory: tuple[Wheels, Wheels], now: Substep, time_constant: Array, second_pole: Array
+    push: Push, memory: tuple[Wheels, Wheels], now: Substep, time_constant: Array, second_order: Array
 ) -> tuple[Push, tuple[Wheels, Wheels]]:
-    """What passes the lag of both motors, one pole and then another (`second_pole`: its part of the time constant);
-    memory: what passed each at last."""
-    push, first = one_pole(push, memory[0], now.step, (1.0 - second_pole) * time_constant)
-    push, second = one_pole(push, memory[1], now.step, second_pole * time_constant)
+    """What passes the lag of both motors, one pole after the other; memory: what passed each at last."""
+    slower, faster = poles(time_constant, second_order)
+    push, first = one_pole(push, memory[0], now.step, slower)
+    push, second = one_pole(push, memory[1], now.step, faster)
     return push, (first, second)
+
+
+def poles(time_constant: Array, second_order: Array) -> tuple[Array, Array]:
+    """Time constants of the poles of m = q + tau q' + e tau^2 q'' / 4: tau and 0 at e = 0, twice tau / 2 at e = 1."""
+    apart = jnp.sqrt(jnp.maximum(1.0 - second_order, TOGETHER))
+    return 0.5 * time_constant * (1.0 + apart), 0.5 * time_constant * (1.0 - apart)
 
 
 def one_pole(push: Push, memory: Wheels, step: Array, time_constant: Array) -> tuple[Push, Wheels]:
@@ -110,10 +119,10 @@ def one_pole(push: Push, memory: Wheels, step: Array, time_constant: Array) -> t
     return Push(means, slopes), ends
 
 
-def lag_of_runs(push: Push, _: Physical, step: Array, time_constant: Array, second_pole: Array) -> Push:
+def lag_of_runs(push: Push, _: Physical, step: Array, time_constant: Array, second_order: Array) -> Push:
     """`lag` over whole runs (points, runs, 2), steps (points, runs, 1) [s]."""
-    first = _pole_of_runs(push, step, (1.0 - second_pole) * time_constant)
-    return _pole_of_runs(first, step, second_pole * time_constant)
+    slower, faster = poles(time_constant, second_order)
+    return _pole_of_runs(_pole_of_runs(push, step, slower), step, faster)
 
 
 def _pole_of_runs(push: Push, step: Array, time_constant: Array) -> Push:

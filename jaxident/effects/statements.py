@@ -128,8 +128,12 @@ def _pole(time_constant: str, memory: str) -> tuple[str, ...]:
     )  # fmt: skip
 
 
+_APART = "sqrt(clip(1.0 - {second_order}, 0.0, 1.0))"
 LAG = Step(
-    (*_pole("{time_constant} * (1.0 - {second_pole})", "q"), *_pole("{time_constant} * {second_pole}", "s")),
+    (
+        *_pole(f"0.5 * {{time_constant}} * (1.0 + {_APART})", "q"),
+        *_pole(f"0.5 * {{time_constant}} * (1.0 - {_APART})", "s"),
+    ),
     memory=("q_r", "q_l", "s_r", "s_l"),
 )
 PLAY = Step(tuple(line for s, width in zip("rl", ("{right}", "{left}"), strict=True) for line in (

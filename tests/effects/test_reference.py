@@ -58,7 +58,7 @@ FORMS = [
     ("input_quantisation", {"step": 0.15}, {"towards_zero": 1.0}),
     ("input_saturation", {"level": 0.6}, {"soft": 1.0}),
     ("input_rate_limit", {"rate": 3.0}, {"falling_ratio": 2.5}),
-    ("motor_lag", {"time_constant": 0.15}, {"second_pole": 0.4}),
+    ("motor_lag", {"time_constant": 0.15}, {"second_order": 0.9}),
     ("gain_drift", {"rate": -0.02}, {"growth": 1.0}),
     ("dead_zone_drift", {"rate": 0.02}, {"growth": -1.0}),
     ("lens_distortion", {"strength": 0.2, "centre_x": 0.2}, {"edge": 2.0}),

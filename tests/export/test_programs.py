@@ -40,7 +40,7 @@ GROUPS = {
 FORMS = {"input_quantisation": {"towards_zero": 1.0}, "input_saturation": {"soft": 1.0},
          "gain_drift": {"growth": 0.15}, "dead_zone_drift": {"growth": -0.05},
          "input_rate_limit": {"falling_ratio": 0.4}, "lens_distortion": {"edge": 0.3},
-         "motor_lag": {"second_pole": 0.5}}  # fmt: skip
+         "motor_lag": {"second_order": 0.5}}  # fmt: skip
 """Forms of the effects of the last groups; one drift ends after 20 of 30 s."""
 
 

@@ -60,7 +60,7 @@ def test_sets_of_effects_become_robots():
     ]  # fmt: skip
     found = [{effect.name: effect.parameters for effect in robot.model.effects} for robot in study.robots[1::2]]
     assert found[0] == {}
-    assert found[1]["motor_lag"] == {"time_constant": 0.03, "second_pole": 0.0}
+    assert found[1]["motor_lag"] == {"time_constant": 0.03, "second_order": 0.0}
     assert found[1]["slope"] == {"acceleration": 0.1, "direction": 0.7}  # the direction is a shape
     assert found[2:4] == [{"stiction": {"right": 0.1}}, {"input_saturation": {"level": 0.3, "soft": 0.0}}]
     assert found[4] == {"input_saturation": {"level": 0.15, "soft": 0.0}}
@@ -78,7 +78,7 @@ def test_an_axis_of_effects():
     sizes = [{effect.name: effect.parameters for effect in one.effects} for one in study.effects]
     assert sizes[0] == sizes[5] == {}
     assert sizes[1]["turn_loss"] == CATALOGUE["turn_loss"].typical()
-    assert sizes[2]["motor_lag"] == {"time_constant": 0.03, "second_pole": 0.0}
+    assert sizes[2]["motor_lag"] == {"time_constant": 0.03, "second_order": 0.0}
     assert sizes[4] == {"slope": {"acceleration": 1.0}}
     assert [one["name"] for one in describe(study)["effects"]] == [one.name for one in study.effects]
 

@@ -56,7 +56,8 @@ class Robot:
         self.command, self.begin, self.target, self.changed = np.zeros(2), 0.0, np.zeros(2), False
         self.slides = [0, 0]
         self.lag = self.of("motor_lag", "time_constant")
-        self.second = self.of("motor_lag", "second_pole")
+        order = self.of("motor_lag", "second_order")  # of one pole and the other, over the whole
+        self.second = min(abs(root) for root in np.roots([1.0, -1.0, 0.25 * order]))
         self.coulomb = [self.of("coulomb_friction", side) for side in ("right", "left")]
         self.static = [self.of("stiction", side) for side in ("right", "left")]
         self.rubs = any(self.coulomb) or any(self.static)

@@ -179,15 +179,16 @@ def test_an_effect_in_the_wrong_form_takes_the_other(true, begun):
 @pytest.mark.parametrize(
     "true",
     [{("input_rate_limit", "inverse_rate"): 0.3, ("input_rate_limit", "log_falling_ratio"): 0.7},
-     {LAG: 0.15, ("motor_lag", "second_pole"): 0.35},
+     {LAG: 0.15, ("motor_lag", "second_order"): 0.8},
      {("lens_distortion", "strength"): 1.5, ("lens_distortion", "edge"): 3.0}],
     ids=["ramps", "poles", "edge"],
 )  # fmt: skip
 def test_a_form_that_is_a_number_is_fitted(true):
     (size, shape), (name, *_) = true.items(), next(iter(true))
-    data, fit = fitted(windows_of(robot_with(true)), (name,), {size[0]: size[1]})
+    _, fit = fitted(windows_of(robot_with(true)), (name,), {size[0]: size[1]})
     for pair, value in (size, shape):
-        deviation = np.sqrt(fit.covariance[fit.places.index(PLACES[pair])][fit.places.index(PLACES[pair])])
+        own = fit.places.index(PLACES[pair])
+        deviation = np.sqrt(fit.covariance[own, own])
         assert deviation < 0.2 * value
         assert abs(fit.vector[PLACES[pair]] - value) < 4.0 * deviation
 

@@ -87,7 +87,7 @@ FORMS = [
     ("input_quantisation", {"towards_zero": 1.0}),
     ("input_saturation", {"soft": 1.0}),
     ("input_rate_limit", {"falling_ratio": 2.5}),
-    ("motor_lag", {"second_pole": 0.5}),
+    ("motor_lag", {"second_order": 1.0}),
     ("gain_drift", {"growth": 0.5}),
     ("dead_zone_drift", {"growth": -0.5}),
     ("lens_distortion", {"edge": 0.8}),
