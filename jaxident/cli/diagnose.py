@@ -153,5 +153,6 @@ def _gap(found) -> str:
 
 
 def _shrink(shrink) -> str:
+    """A shrink and its interval, in per cent."""
     low, high = shrink.interval
     return f"{100 * shrink.value:.0f} % ({100 * low:.0f} to {100 * high:.0f} %, 90 % interval)"

@@ -46,7 +46,7 @@ def _as_rates(c: Values) -> dict[str, float]:
 
 
 def _as_inverses(p: Values) -> dict[str, float]:
-    return {"inverse_rate": 1.0 / p["rate"], "log_falling_ratio": float(np.log(p["falling_ratio"]))}
+    return {"inverse_rate": 1.0 / p["rate"], "log_falling_ratio": float(np.log(p.get("falling_ratio", 1.0)))}
 
 
 def _pair(unit: str, size: float, typical: float, **more) -> tuple[Parameter, Parameter]:
@@ -136,11 +136,11 @@ RECORDS = (
         kinds=_LATE,
         source="slew limit of motor drivers; Franklin, Powell, Emami-Naeini, ch. 9",
         parameters=(Parameter("rate", f"{UNIT}/s", float("inf"), (1.0, 50.0), 5.0, least=0.0, above=True),
-                    Parameter("falling_ratio", "", 1.0, (0.25, 4.0), 1.0, least=0.0, above=True, shape=True)),
+                    Parameter("falling_ratio", "", 1.0, (0.2, 20.0), 1.0, least=0.0, above=True, shape=True)),
         channels=BOTH,
         act=input_rate_limit, fast=rate_limit_by_inverse, confused_with=("motor_lag",), smooth=False,
         grid=(50.0, 20.0, 10.0, 5.0, 2.0, 1.0), sharp=True,
-        search=Search((positive("inverse_rate", 2.0), signed("log_falling_ratio", float(np.log(4.0)), shape=True)),
+        search=Search((positive("inverse_rate", 2.0), signed("log_falling_ratio", float(np.log(20.0)), shape=True)),
                       Transform(_as_rates, _as_inverses),
                       lambda _: [{"inverse_rate": inverse} for inverse in (0.03, 0.07, 0.15, 0.3, 0.6)]),
     ),

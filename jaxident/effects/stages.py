@@ -72,7 +72,7 @@ def seen(settings: Settings, pose: Pose, *, fast: bool = False) -> Pose:
 
 
 def remembered_at_rest(effect: EffectRecord, like: Array) -> Any:
-    """What a law of stage `gear` remembers of a robot at rest."""
+    """What a law that remembers the input has of a robot at rest."""
     still = Wheels(jnp.zeros_like(like), jnp.zeros_like(like))
     return still if effect.memory == 1 else (still,) * effect.memory
 

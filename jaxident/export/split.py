@@ -133,7 +133,7 @@ def _discovered(target: Target) -> Part:
 
 def _in_first_form(effect: Effect) -> bool:
     """Whether what acts before the wheels has the first of its forms, as fields of simulators have it: those that limit
-    commands cut them off."""
+    commands cut them off, and those that lag have one pole."""
     record, values = CATALOGUE[effect.name], values_of(effect)
     return record.stage not in INPUT or all(values[p.name] == p.neutral for p in record.parameters if p.shape)
 

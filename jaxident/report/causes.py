@@ -160,7 +160,7 @@ def shrink(found: Diagnosis) -> Section:
     weak = gap.placebo[0] if gap.placebo else ""
     for name, one in sorted(found.shrinks.items(), key=lambda pair: (pair[0] == weak, -(pair[1].value or 0.0))):
         if one.value is not None and one.interval is not None and plain(name) not in rows:
-            rows[plain(name)] = one.value, one.interval, "placebo" if name == weak else "other effects, alone"
+            rows[plain(name)] = one.value, one.interval, "placebo" if name == weak else "each effect alone"
     if not rows:
         told = NOTHING_TO_SHRINK if gap.shrink.value is None else NOTHING_NAMED
         return Section("How far the gap shrinks", [told])

@@ -236,6 +236,8 @@ def test_a_limit_before_what_mixes_wheels_stands_in_the_wrapper():
     assert ways(ji.export(both, "mjcf"))["input_saturation"] == "wrapper"
     soft = with_one("input_saturation", level=0.6, soft=1.0)
     assert ways(ji.export(soft, "mjcf"))["input_saturation"] == "wrapper", "its field cuts off"
+    twice = with_one("motor_lag", time_constant=0.05, second_order=0.5)
+    assert ways(ji.export(twice, "mjcf"))["motor_lag"] == "wrapper", "its field has one pole"
     late = with_effects(PLAIN, [("transport_delay", {"delay": 0.05}), ("gain_drift", {"rate": -0.02})])
     assert ways(ji.export(late, "mjcf"))["transport_delay"] == "wrapper"
     alone = with_one("input_saturation", level=0.6)
