@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 import xarray
 import zarr
 
+from jaxident.effects.catalogue import CATALOGUE
 from jaxident.errors import InputError, WorkError
 from jaxident.files.atomic import Target, explained, make_folder, write_text
 from jaxident.files.json_text import format_json, read_json
@@ -124,11 +125,24 @@ def _check_same(study: Study, folder: pathlib.Path) -> None:
         theirs = read_json(path)
     except InputError as error:
         raise WorkError(f"{error}: damaged, so nobody knows what its trials are of; {TRIALS_HELP}") from None
-    unlike = _first_difference(theirs, ours, "")
+    unlike = _first_difference(completed(theirs), ours, "")
     if unlike is not None:
         key, there, here = unlike
         raise InputError(f"{folder}: holds the trials of another study: {key} is {there} there, {here} here; "
                          f"{TRIALS_HELP}")  # fmt: skip
+
+
+def completed(content: Any) -> Any:
+    """A content of study.json with every effect's parameters: those that a version before did not have are neutral."""
+    if isinstance(content, list):
+        return [completed(each) for each in content]
+    if not isinstance(content, dict):
+        return content
+    neutral = {name: CATALOGUE[name].neutral() for name in content if name in CATALOGUE}
+    return {
+        key: neutral[key] | own if key in neutral and isinstance(own, dict) else completed(own)
+        for key, own in content.items()
+    }
 
 
 def _first_difference(there: Any, here: Any, key: str) -> tuple[str, str, str] | None:

@@ -13,7 +13,9 @@ from jaxident.errors import InputError, WorkError
 from jaxident.files import sweeps, trials
 from jaxident.files.sweeps import Told, sweep
 from jaxident.files.trials import opened
+from jaxident.robot.model import Effect
 from jaxident.study.dataset import study_arrays
+from jaxident.study.design import EffectSet
 from jaxident.study.engine import run_chunk
 
 
@@ -148,6 +150,25 @@ def test_another_study_is_refused(tmp_path, other, words):
     for word in [*words, "another folder"]:
         assert word in str(error.value)
     assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_study_whose_effect_has_another_form_since_goes_on(tmp_path):
+    lag = Effect("motor_lag", {"time_constant": 0.1, "second_order": 0.0})
+    study = SMALL._replace(effects=(EffectSet("none"), EffectSet("lag", (lag,))))
+    with opened(study, tmp_path):
+        pass
+    path = tmp_path / "study.json"
+    kept = json.loads(path.read_text())
+    del kept["study"]["effects"][1]["effects"]["motor_lag"]["second_order"]
+    path.write_text(json.dumps(kept))
+    with opened(study, tmp_path):
+        pass
+    twice = Effect("motor_lag", {"time_constant": 0.1, "second_order": 0.5})
+    with (
+        pytest.raises(InputError, match="another study"),
+        opened(study._replace(effects=(EffectSet("none"), EffectSet("lag", (twice,)))), tmp_path),
+    ):
+        pass
 
 
 def test_another_version_is_refused(tmp_path, monkeypatch):

@@ -9,7 +9,7 @@ import pytest
 
 from jaxident.files.models import load_model, model_to_dict, save_model
 from jaxident.files.studies import read_study
-from jaxident.files.trials import open_trials
+from jaxident.files.trials import completed, open_trials
 from jaxident.robot.model import DIFFERENCE_ORDER
 from jaxident.study.dataset import describe
 
@@ -43,10 +43,11 @@ def test_a_store_of_trials(tmp_path):
 
 
 def test_a_study_means_what_it_meant():
-    """Word for word, so that a sweep that 0.1 began can go on."""
+    """Word for word, so that a sweep that 0.1 began can go on; a lag had no `second_order` then."""
     kept = json.loads((OLD / "study" / "study.json").read_text("utf-8"))
     assert kept["schema"] == "jaxident.study/1"
-    assert json.loads(json.dumps(describe(read_study(OLD / "study.toml")))) == kept["study"]
+    assert json.loads(json.dumps(describe(read_study(OLD / "study.toml")))) == completed(kept["study"])
+    assert completed(kept["study"]) != kept["study"]
 
 
 def test_a_diagnosis_has_the_names_that_programs_read():
