@@ -32,6 +32,8 @@ from jaxident.effects.gears import lag, lag_of_runs, play, play_of_runs
 from jaxident.effects.law_kinds import CHANGES, WHEELS
 from jaxident.effects.motors import asymmetric_dead_zone, direction_gain, supply_sag
 
+AT_ONCE = 1e-3
+"""Least time in which a command falls, over that in which it rises: files hold no infinite ratio."""
 OFF = 1e3
 """A saturation level far above every command, in largest commands."""
 _LATE = tuple(
@@ -42,11 +44,11 @@ _LATE = tuple(
 
 def _as_rates(c: Values) -> dict[str, float]:
     rate = float(1.0 / c["inverse_rate"]) if c["inverse_rate"] > 0.0 else float("inf")
-    return {"rate": rate, "falling_ratio": float(np.exp(c["log_falling_ratio"]))}
+    return {"rate": rate, "falling_ratio": float(1.0 / c["falling_time"])}
 
 
 def _as_inverses(p: Values) -> dict[str, float]:
-    return {"inverse_rate": 1.0 / p["rate"], "log_falling_ratio": float(np.log(p.get("falling_ratio", 1.0)))}
+    return {"inverse_rate": 1.0 / p["rate"], "falling_time": 1.0 / p.get("falling_ratio", 1.0)}
 
 
 def _pair(unit: str, size: float, typical: float, **more) -> tuple[Parameter, Parameter]:
@@ -136,11 +138,11 @@ RECORDS = (
         kinds=_LATE,
         source="slew limit of motor drivers; Franklin, Powell, Emami-Naeini, ch. 9",
         parameters=(Parameter("rate", f"{UNIT}/s", float("inf"), (1.0, 50.0), 5.0, least=0.0, above=True),
-                    Parameter("falling_ratio", "", 1.0, (0.2, 20.0), 1.0, least=0.0, above=True, shape=True)),
+                    Parameter("falling_ratio", "", 1.0, (0.2, 1000.0), 1.0, least=0.0, above=True, shape=True)),
         channels=BOTH,
         act=input_rate_limit, fast=rate_limit_by_inverse, confused_with=("motor_lag",), smooth=False,
         grid=(50.0, 20.0, 10.0, 5.0, 2.0, 1.0), sharp=True,
-        search=Search((positive("inverse_rate", 2.0), signed("log_falling_ratio", float(np.log(20.0)), shape=True)),
+        search=Search((positive("inverse_rate", 2.0), Coordinate("falling_time", 1.0, AT_ONCE, 5.0, 0.5, shape=True)),
                       Transform(_as_rates, _as_inverses),
                       lambda _: [{"inverse_rate": inverse} for inverse in (0.03, 0.07, 0.15, 0.3, 0.6)]),
     ),

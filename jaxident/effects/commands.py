@@ -81,10 +81,10 @@ def input_rate_limit(now: Wheels, target: Wheels, elapsed: Array, rate: Array, f
 
 
 def rate_limit_by_inverse(
-    now: Wheels, target: Wheels, elapsed: Array, inverse_rate: Array, log_falling_ratio: Array
+    now: Wheels, target: Wheels, elapsed: Array, inverse_rate: Array, falling_time: Array
 ) -> Wheels:
-    """`input_rate_limit`, smooth at no limit."""
-    return _ramped(now, target, elapsed, inverse_rate, inverse_rate * jnp.exp(-log_falling_ratio))
+    """`input_rate_limit`, smooth at no limit and where commands fall at once (falling_time 0)."""
+    return _ramped(now, target, elapsed, inverse_rate, inverse_rate * falling_time)
 
 
 def _ramped(now: Wheels, target: Wheels, time: Array, rising: Array, falling: Array) -> Wheels:

@@ -178,7 +178,7 @@ def test_an_effect_in_the_wrong_form_takes_the_other(true, begun):
 
 @pytest.mark.parametrize(
     "true",
-    [{("input_rate_limit", "inverse_rate"): 0.3, ("input_rate_limit", "log_falling_ratio"): 0.7},
+    [{("input_rate_limit", "inverse_rate"): 0.3, ("input_rate_limit", "falling_time"): 0.5},
      {LAG: 0.15, ("motor_lag", "second_order"): 0.8},
      {("lens_distortion", "strength"): 1.5, ("lens_distortion", "edge"): 3.0}],
     ids=["ramps", "poles", "edge"],
