@@ -105,7 +105,7 @@ def lag(
 
 
 def poles(time_constant: Array, second_order: Array) -> tuple[Array, Array]:
-    """Time constants of the poles of m = q + tau q' + e tau^2 q'' / 4: tau and 0 at e = 0, twice tau / 2 at e = 1."""
+    """Time constants of the poles of m = q + tau q' + e tau^2 q'' / 4: tau and 0 at e = 0, both tau / 2 at e = 1."""
     apart = jnp.sqrt(jnp.maximum(1.0 - second_order, TOGETHER))
     return 0.5 * time_constant * (1.0 + apart), 0.5 * time_constant * (1.0 - apart)
 

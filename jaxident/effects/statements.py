@@ -116,6 +116,7 @@ GAIN_DRIFT = Step((
 
 
 def _pole(time_constant: str, memory: str) -> tuple[str, ...]:
+    """What passes one pole of both wheels' lags, its push taken for held; memory: what passed at last."""
     return (
         f"a = {time_constant}",
         "b = pick(a > 0.0, exp(-dt / pick(a > 0.0, a, 1.0)), 0.0)",
@@ -129,6 +130,7 @@ def _pole(time_constant: str, memory: str) -> tuple[str, ...]:
 
 
 _APART = "sqrt(clip(1.0 - {second_order}, 0.0, 1.0))"
+"""Difference of the time constants of both poles over their sum, as `gears.poles` has it."""
 LAG = Step(
     (
         *_pole(f"0.5 * {{time_constant}} * (1.0 + {_APART})", "q"),

@@ -81,7 +81,7 @@ def one(answer: dict, folder: pathlib.Path, shrink: bool) -> dict[str, Any]:
     found["unexplained_top"] = [given["unexplained"], outside] if "unexplained" in given else None
     found["seconds"] = json.loads(record.read_text())["seconds"] if record.exists() else None
     gap = (diagnosis or {}).get("gap") or {}
-    found["interval"] = gap.get("whole_shrink_interval", gap.get("shrink_interval"))  # older ones lack the first
+    found["interval"] = gap.get("whole_shrink_interval", gap.get("shrink_interval"))  # older ones have the second
     if shrink and diagnosis and shrinkable(answer) and (folder / "corrected_model.json").exists():
         models = [ji.load_model(folder / f"{name}_model.json") for name in ("nominal", "corrected")]
         found["shrink"] = true_shrink(answer, *models, gap["horizon"], fresh_runs(answer))["shrink"]
