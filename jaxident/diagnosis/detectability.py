@@ -52,7 +52,7 @@ def answers(data: Data, nominal: Solution, largest: float) -> Answers:
     smooth = {name: [PLACES[name, key] for key in keys] for name, keys in sized.items()}
     places = [place for own in smooth.values() for place in own]
     linear = linearise(nominal.vector, nominal.starts, data.windows, [*nominal.places, *places])
-    usual = {name: _typical(name, largest, duration) for name in COORDINATES}
+    usual = {name: _typical(name, nominal.vector, largest, duration) for name in COORDINATES}
     change = differences(data, nominal, [seeded(nominal.vector, name, size) for name, size in usual.items()])
     columns = np.concatenate([linear.slopes, change], axis=2)
     more = None
@@ -105,10 +105,10 @@ def _evidence(found: Answers, name: str, cross: Array) -> np.ndarray:
     return 0.5 * np.sum(right * np.linalg.solve(precision, right), axis=0) - room + CHANCE
 
 
-def _typical(name: str, largest: float, duration: float) -> dict[str, float]:
-    """The coordinates of an effect at its typical size."""
+def _typical(name: str, vector: Array, largest: float, duration: float) -> dict[str, float]:
+    """The coordinates of an effect of a robot at its typical size."""
     typical, factors = CATALOGUE[name].typical(duration), unit_factors(name, largest)
-    return from_catalogue(name, {key: value / factors[key] for key, value in typical.items()})
+    return from_catalogue(name, {key: value / factors[key] for key, value in typical.items()}, vector[:2])
 
 
 def _without(products: Array, count: int) -> np.ndarray:

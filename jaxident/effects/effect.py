@@ -56,7 +56,7 @@ EVERYWHERE = (ALONG, LATERAL, HEADING)
 EDGE = 0.2
 """Part of a session, at its begin and at its end, in which no change at an instant is looked for: few windows tell it,
 and it foretells all that follows. On half a log of a Create, a load that changed 19 s before the end of 443 s took the
-error 10 s ahead on the other half from 41 to 107 mm. No other value was tried."""
+error 10 s ahead on the other half from 41 to 107 mm. No other was tried."""
 
 
 class Parameter(NamedTuple):
@@ -97,7 +97,8 @@ class Coordinate(NamedTuple):
     follow it in jumps, or it chooses between two forms, so that it is looked for on a grid alone. unseen: no log tells
     it, unless an effect acts on the speeds of axle or wheels. by_drive: above 0, what drives the wheels depends on the
     drive as well. reach: where -log p has many valleys, how far each further search for the best goes, in the
-    coordinate's unit, or if `relative` as a part of it. below: values from here on are impossible for any robot.
+    coordinate's unit, or if `relative` as a part of it. below: no robot has values from here on. over_rate: an
+    acceleration along (0) or in heading (1), told for a robot of the typical rate (`coordinates.ACCELERATIONS`).
     """
 
     name: str
@@ -113,6 +114,7 @@ class Coordinate(NamedTuple):
     reach: tuple[float, ...] = ()
     relative: bool = False
     below: float = math.inf
+    over_rate: int | None = None
 
 
 def signed(name: str, high: float, **more: Any) -> Coordinate:
@@ -150,8 +152,7 @@ class Search(NamedTuple):
     transform: where the coordinates are not the parameters. seeds(duration): points {coordinate: value} from which it
     is looked for in a session of some duration [s]. Without seeds, or with a first one that is empty, the derivative at
     neutral says where to begin; further seeds then stand for other forms of the effect. on_speeds: it acts on the
-    speeds of axle or wheels.
-    all_or_nothing: its gain does not grow with its size.
+    speeds of axle or wheels. all_or_nothing: its gain does not grow with its size.
     """
 
     coordinates: tuple[Coordinate, ...]

@@ -67,8 +67,8 @@ def test_a_model_with_effects_is_a_simulator():
     expected = neutral_vector(np.concatenate([np.log([2.0, 3.0]), 90.0 * gain.ravel(), [0.1, 0.05, 0.0, 0.0]]))
     expected[PLACES["input_saturation", "level"]] = 0.8
     expected[PLACES["transport_delay", "delay"]] = 0.12
-    expected[PLACES["slope", "y"]] = 0.2
-    expected[PLACES["mass_offset", "along"]] = 0.1
+    expected[PLACES["slope", "y"]] = 0.3  # a robot of 2 1/s settles at what one of 3 1/s would under 0.3
+    expected[PLACES["mass_offset", "along"]] = 0.15
     np.testing.assert_allclose(found.vector, expected, atol=1e-12)
     assert found.effects == tuple(effect.name for effect in effects)
 

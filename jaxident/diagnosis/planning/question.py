@@ -111,11 +111,11 @@ def ask(
     base = neutral_vector(scaled(nominal_vector(drive, dead_zone), 1.0 / limit))
     for effect in model.effects:
         if effect.name in COORDINATES and effect.name not in effects:
-            base = seeded(base, effect.name, _inner(effect.name, effect.parameters, limit))
+            base = seeded(base, effect.name, _inner(effect.name, effect.parameters, limit, base))
     vectors: list[np.ndarray] = []
     expected, rays = [], []
     for name in effects:
-        size = _inner(name, sizes[name], limit)
+        size = _inner(name, sizes[name], limit, base)
         expected.append(len(vectors))
         vectors.append(seeded(base, name, size))
         own = _points(name, size, samples * period)
@@ -124,10 +124,10 @@ def ask(
                     period, rows, laws_of(model.discovered, limit))  # fmt: skip
 
 
-def _inner(name: str, parameters: dict[str, Any], limit: float) -> dict[str, float]:
-    """Coordinates of an effect, commands over the limit."""
+def _inner(name: str, parameters: dict[str, Any], limit: float, base: Array) -> dict[str, float]:
+    """Coordinates of an effect of the robot of a vector, commands over the limit."""
     factors = unit_factors(name, limit)
-    return from_catalogue(name, {key: float(value) / factors[key] for key, value in parameters.items()})
+    return from_catalogue(name, {key: float(value) / factors[key] for key, value in parameters.items()}, base[:2])
 
 
 def _points(name: str, size: dict[str, float], duration: float) -> list[dict[str, float]]:

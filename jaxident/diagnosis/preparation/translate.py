@@ -1,6 +1,7 @@
 """Between the coordinates of a search, for commands over their largest, and models in the user's unit."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -56,21 +57,11 @@ def parameters_of(solution: Solution, largest: float) -> tuple[tuple[str, ...], 
 
 def effect_of(name: str, solution: Solution, largest: float) -> Effect:
     """One effect of a solution with standard deviations, in the user's unit; deviations to first order."""
-    coordinates = [c.name for c in COORDINATES[name]]
-    here = {key: solution.vector[PLACES[name, key]] for key in coordinates}
-    factors, values = unit_factors(name, largest), effect_values(name, solution.vector, largest)
-    places = [solution.places.index(PLACES[name, key]) for key in coordinates if PLACES[name, key] in solution.places]
-    if not places:  # looked for on a grid alone
+    values = effect_values(name, solution.vector, largest)
+    if not {PLACES[name, c.name] for c in COORDINATES[name]} & set(solution.places):  # looked for on a grid alone
         return Effect(name, values)
-    own = solution.covariance[np.ix_(places, places)]
-    slopes = []
-    for place in places:
-        key = next(k for k in coordinates if PLACES[name, k] == solution.places[place])
-        step = 1e-6 * max(abs(here[key]), 1e-3)
-        moved = to_catalogue(name, {**here, key: here[key] + step})
-        slopes.append([(moved[k] * factors[k] - values[k]) / step for k in values])
-    slope = np.array(slopes)
-    spread = np.sqrt(np.maximum(np.einsum("ap,ab,bp->p", slope, own, slope), 0.0))
+    slope = _slopes(solution, lambda vector: list(effect_values(name, vector, largest).values()))
+    spread = np.sqrt(np.maximum(np.sum(slope @ solution.covariance * slope, axis=1), 0.0))
     deviations = dict(zip(values, spread.tolist(), strict=True))
     if name == ASIDE[0] and PLACES[ASIDE] not in solution.places:
         deviations[ASIDE[1]] = limits()[1][PLACES[ASIDE]] / 3.0**0.5  # it lies anywhere within its bounds
@@ -80,7 +71,7 @@ def effect_of(name: str, solution: Solution, largest: float) -> Effect:
 def effect_values(name: str, vector: Array, largest: float) -> dict[str, float]:
     """Parameters of an effect at coordinates (SIZE,), in the user's unit."""
     factors = unit_factors(name, largest)
-    found = to_catalogue(name, {c.name: vector[PLACES[name, c.name]] for c in COORDINATES[name]})
+    found = to_catalogue(name, {c.name: vector[PLACES[name, c.name]] for c in COORDINATES[name]}, vector[:2])
     return {key: value * factors[key] for key, value in found.items()}
 
 
@@ -130,18 +121,25 @@ def slopes_of(fit: Solution, effects: Sequence[Effect], largest: float) -> tuple
     to its free coordinates (parameters, coordinates); without those that were looked for on a grid alone."""
     names = [*NOMINAL, *(f"{effect.name}.{key}" for effect in effects for key in effect.parameters)]
 
-    def values(vector: Array) -> np.ndarray:
+    def values(vector: Array) -> list[float]:
         own = [effect_values(effect.name, vector, largest) for effect in effects]
-        return np.array([*in_user_units(vector, largest), *(value for each in own for value in each.values())])
+        return [*in_user_units(vector, largest), *(value for each in own for value in each.values())]
 
-    columns, here = [], values(fit.vector)
+    slope = _slopes(fit, values)
+    told = np.any(slope != 0.0, axis=1)
+    return tuple(name for name, kept in zip(names, told, strict=True) if kept), slope[told]
+
+
+def _slopes(fit: Solution, values: Callable[[Array], Any]) -> np.ndarray:
+    """How some values (parameters,) of a vector (SIZE,) answer to the free coordinates of a fit (parameters,
+    coordinates)."""
+    columns, here = [], np.array(values(fit.vector))
     for place in fit.places:
         step, moved = 1e-6 * max(abs(fit.vector[place]), 1e-3), np.array(fit.vector)
         moved[place] += step
-        columns.append((values(moved) - here) / step)
-    slope = np.stack(columns, axis=1)
-    told = np.any(slope != 0.0, axis=1)
-    return tuple(name for name, kept in zip(names, told, strict=True) if kept), slope[told]
+        with np.errstate(invalid="ignore"):  # a limit that never acts is infinite
+            columns.append((np.array(values(moved)) - here) / step)
+    return np.stack(columns, axis=1)
 
 
 def noise_of(law: Law, apart: bool = False) -> Noise:

@@ -22,8 +22,9 @@ from jaxident.array_types import Array, Column, Gains, Rows, Square, Unknowns, U
 from jaxident.estimation.poses.parameters import Law, is_logarithmic, names
 from jaxident.estimation.poses.runs import Runs, row_times, rows_used
 from jaxident.numerics import safe_divide, sin_cos, wrap
+from jaxident.robot.drive import TYPICAL_RATE
 
-RATE, RATE_SPREAD = 3.0, 1.175
+RATE, RATE_SPREAD = TYPICAL_RATE, 1.175
 """Middle of the rates [1/s], and the deviation of their logarithm."""
 SLOWEST_ROBOT = float(RATE * np.exp(-1.96 * RATE_SPREAD))
 """The rate [1/s] below which one robot in forty answers."""

@@ -5,13 +5,13 @@ import pytest
 from support.small_robot import LAW, VECTOR, nominal_fit, robot_with, windows_of
 
 from jaxident.diagnosis.causes.columns import AMPLITUDE, FAR, _Column, _in_order, answers_of, tabulate
-from jaxident.diagnosis.causes.evidence import log_evidence, posterior_mean
+from jaxident.diagnosis.causes.evidence import log_evidence, posterior_mean, worth
 from jaxident.diagnosis.causes.moves import fit_options, stands
 from jaxident.diagnosis.causes.points import differences, points_of, seeded, sizes_of
 from jaxident.diagnosis.fit.refit import Data, refit
 from jaxident.diagnosis.motion.linear import follow, linearise
-from jaxident.diagnosis.noise.law import white_whitener
-from jaxident.effects.coordinates import COORDINATES, NOMINAL, PLACES, SILENT, SMOOTH, sizes
+from jaxident.diagnosis.noise.law import Law, white_whitener
+from jaxident.effects.coordinates import ACCELERATIONS, COORDINATES, NOMINAL, PLACES, SILENT, SMOOTH, sizes
 
 SIZES = {("slope", "x"): 0.3, ("slope", "y"): -0.2, ("transport_delay", "delay"): 0.08}
 FAINT = {("turn_loss", "loss"): 0.1, ("slope", "x"): 0.004}
@@ -228,9 +228,9 @@ def test_what_windows_say_spreads_less_once_the_rest_is_taken_away(beside):
         return np.sum(scores[:, columns] ** 2, axis=0)
 
     along_x, along_y, delay = spread(tabulate(data, fit, effects, term)) / spread(alone)
-    assert along_x < 0.6
     assert delay < 0.6
-    assert along_y < 1.3, "the wave goes along x"
+    assert along_y < 1.0
+    assert along_x < 1.1, "the wave goes along x, and what a slope can do of it stays a slope's"
 
 
 def test_a_rest_that_is_free_stands_in_for_names(beside):
@@ -296,3 +296,43 @@ def test_what_a_term_and_an_effect_can_both_do_counts_for_an_owner(beside):
     left = [np.diagonal(table.products.sum(axis=0))[column] for table in (free, owned, alone)]
     assert left[0] < 0.1 * left[2]
     assert left[1] == pytest.approx(left[2], rel=0.05)
+
+
+def test_a_table_tells_what_a_loss_in_turns_brings_where_a_lag_hides_the_rate():
+    """A Create's speeds settle as its lag says. Its loss in turns, which a fit cannot do without, was dropped: a table
+    that was linear in the loss gave it 1.5, where -log p rises by 450."""
+    loss, law, effects = PLACES["turn_loss", "loss"], Law(2e-3, 2e-2), ("turn_loss", "motor_lag")
+    vector = robot_with({("turn_loss", "loss"): 2.0, ("motor_lag", "time_constant"): 0.15})
+    vector[0], vector[2:4] = np.log(30.0), 10.0 * vector[2:4]
+    windows = windows_of(vector, law=law)
+    data = Data(windows, white_whitener(law, windows))
+    fit = refit(data, vector, np.zeros((5, len(windows.run))), effects)
+    table = tabulate(data, fit, effects)
+    own = worth(table, [table.here[name] for name in effects], table.here["turn_loss"])
+    without = fit_options(data, table, stands(fit, effects), [table.here["motor_lag"]])
+    risen = without.fit.cost - fit.cost
+    assert risen > 300.0
+    assert risen / 4.0 < own.gain < 4.0 * risen
+    both = [fit.places.index(place) for place in (0, loss)]
+    (rate, cross), (_, size) = fit.covariance[np.ix_(both, both)]
+    assert abs(cross) < 0.5 * np.sqrt(rate * size), "the loss at the typical rate is known without the rate"
+
+
+def test_accelerations_stand_for_a_robot_of_the_typical_rate():
+    """Robots that settle at 100 and at 200 1/s go the same way where the coordinate of an acceleration is the same."""
+    assert len(ACCELERATIONS) > 4
+    slow, fast = VECTOR.copy(), VECTOR.copy()
+    for vector, rate in ((slow, 100.0), (fast, 200.0)):
+        vector[:2], vector[2:6] = np.log(rate), VECTOR[2:6] * rate / 10.0
+    for name, key, _ in ACCELERATIONS:
+        size = {key: 0.3 * sizes()[PLACES[name, key]]}
+        (plain, moved), (faster, alike) = ([way(one), way(seeded(one, name, size))] for one in (slow, fast))
+        effect = np.abs(moved - plain).max()
+        assert effect > 1e-5, name
+        assert np.abs((alike - faster) - (moved - plain)).max() < 0.1 * effect, name
+
+
+def way(vector):
+    """Poses of a run, the heading as it goes on."""
+    poses = windows_of(vector, law=Law(1e-12, 1e-12), runs=1).pose.reshape(-1, 3)
+    return np.column_stack([poses[:, :2], np.unwrap(poses[:, 2])])

@@ -27,7 +27,7 @@ def windows():
 def vector_with(name) -> np.ndarray:
     """The small robot with a typical effect."""
     vector = VECTOR.copy()
-    for key, value in from_catalogue(name, CATALOGUE[name].typical()).items():
+    for key, value in from_catalogue(name, CATALOGUE[name].typical(), vector[:2]).items():
         vector[PLACES[name, key]] = value
     return vector
 

@@ -101,7 +101,7 @@ CASES = [(name, {}) for name in COORDINATES] + FORMS
 def test_every_effect_is_that_of_the_full_simulator(log, follow, name, form):
     typical = CATALOGUE[name].typical() | ({"instant": 2.0} if name == "payload_change" else {}) | form
     vector = nominal()
-    for key, value in from_catalogue(name, typical).items():
+    for key, value in from_catalogue(name, typical, vector[:2]).items():
         vector[PLACES[name, key]] = value
     wanted = simulated(log, (Effect(name, typical),)) - simulated(log)
     found = follow(vector) - follow(nominal())
@@ -134,7 +134,7 @@ def test_unseen_poses_leave_no_residual(log):
 def test_effects_that_share_pushes_leave_them_as_they_are(log, name):
     windows, vector = cut(log, ROWS), nominal()
     typical = CATALOGUE[name].typical() | ({"instant": 2.0} if name == "payload_change" else {})
-    for key, value in from_catalogue(name, typical).items():
+    for key, value in from_catalogue(name, typical, vector[:2]).items():
         vector[PLACES[name, key]] = value
     same = jax.tree.map(np.array_equal, PUSH(nominal(), windows), PUSH(vector, windows))
     assert all(same) == (name not in PUSHING)

@@ -9,9 +9,12 @@ from jaxident.diagnosis.decide import compare_parameters
 from jaxident.diagnosis.fit.refit import Solution
 from jaxident.diagnosis.motion.windows import FREE
 from jaxident.diagnosis.noise.law import Law
-from jaxident.diagnosis.preparation.translate import effect_of, to_model
-from jaxident.effects.coordinates import PLACES, free_places, neutral_vector
+from jaxident.diagnosis.preparation.translate import effect_of, effect_values, to_model
+from jaxident.effects.catalogue import CATALOGUE
+from jaxident.effects.coordinates import COORDINATES, PLACES, free_places, neutral_vector, vector_of
 from jaxident.log import make_log
+from jaxident.robot.drive import Physical
+from jaxident.robot.model import Effect, Model
 
 PLACE = {key: PLACES["traction_limit", key] for key in ("inverse_square", "dry", "spin")}
 
@@ -54,3 +57,24 @@ def test_a_limit_that_never_acts_is_none_of_the_model_and_has_no_size():
     rows = compare_parameters(prepared, finding, vector, effects)
     assert all(np.isfinite(row.refitted) for row in rows)
     assert rows[-1].name == "turn_loss loss"
+
+
+@pytest.mark.parametrize("name", COORDINATES)
+def test_a_model_leads_to_coordinates_and_back_whatever_its_rates(name):
+    """Accelerations are searched for as those of a robot of the typical rate; commands here are over 2 units."""
+    drive = Physical(np.array([0.7, 11.0]), np.array([[1.2, 1.1], [9.0, -8.5]]), np.zeros(2))
+    typical = CATALOGUE[name].typical()
+    vector = vector_of(Model(0.03, drive, np.zeros(2), effects=(Effect(name, typical),)), 2.0)
+    found = effect_values(name, vector, 2.0)
+    assert [found[key] for key in typical] == pytest.approx(list(typical.values()), rel=1e-9)
+
+
+def test_a_loss_is_as_uncertain_as_its_rate_makes_it():
+    """Where the coordinate is known and the rate to 10 %, the loss is known to 10 %."""
+    places, vector = free_places(("turn_loss",)), neutral_vector(np.zeros(10))
+    vector[0], vector[PLACES["turn_loss", "loss"]] = np.log(6.0), 0.5
+    variance = np.full(len(places), 1e-10)
+    variance[places.index(0)] = 0.01
+    found = effect_of("turn_loss", Solution(vector, None, places, None, 0.0, np.diag(variance), 1), 1.0)
+    assert found.parameters["loss"] == pytest.approx(1.0)
+    assert found.standard_deviation["loss"] == pytest.approx(0.1, rel=1e-3)
