@@ -50,11 +50,6 @@ class Confirmed(NamedTuple):
         """The corrected model."""
         return self.whole.model
 
-    @property
-    def judged(self) -> Judged:
-        """How it does on the judging rows."""
-        return self.steps[-1]
-
 
 def confirm(prepared: Prepared, finding: Finding, direct: dict, seed: int, plain: Corrected) -> Confirmed | None:
     """The most curves, in the order in which they were found, that the judging rows confirm; None if none.

@@ -106,7 +106,7 @@ def measure(prepared: Prepared, finding: Finding, given: Model | None, common, d
     nobody, everybody = judged[frozenset()], judged[frozenset(players)]
     before = nobody if given is None else judge_model(dataclasses.replace(given, noise=corrected.model.noise), prepared)
     floor = floor_of(corrected.model, everybody, prepared, law, draws)
-    unit, last = deviations(law) ** 2, everybody if shown is None else shown.judged
+    unit, last = deviations(law) ** 2, everybody if shown is None else judge_model(shown.model, prepared)
     missed = {joined: one.error for joined, one in judged.items()}
     account = account_of(prepared.horizon, missed, players, floor, unit, seed, last.error)
     errors = np.stack([one.error**2 / unit for one in (before, nobody, everybody, last)])

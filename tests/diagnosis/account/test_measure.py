@@ -5,6 +5,9 @@ import numpy as np
 import pytest
 
 import jaxident as ji
+from jaxident.diagnosis.account.measure import _wander
+from jaxident.diagnosis.account.shrink import shrink_of
+from jaxident.diagnosis.preparation.judging import judge_model
 from jaxident.log import join, make_log
 from jaxident.robot.drive import Physical
 from jaxident.robot.model import Discovered, Model
@@ -30,3 +33,10 @@ def test_the_whole_shrink_is_that_of_the_model_with_its_laws():
     low, high = gap.whole.interval
     assert low <= gap.whole.value <= high
     assert gap.whole.value > gap.shrink.value
+    judged = judge_model(found.corrected_model, found.prepared)
+    wander = _wander(judged, gap.unit, 0)
+    told = gap.errors[1], gap.errors[-1], gap.floor, gap.noise.draws
+    known, exact = ([shrink_of(*told, each, least=least) for least in (None, gap.noise.steady)]
+                    for each in (wander, 0.0 * wander))  # fmt: skip
+    assert gap.whole in known
+    assert gap.whole not in exact, "its own parameters are not known exactly"
