@@ -11,6 +11,7 @@ from jaxident.diagnosis.account.shrink import RESAMPLES
 from jaxident.diagnosis.causes.finding import CLAIMED, Finding
 from jaxident.diagnosis.simulator import Simulator
 from jaxident.effects.catalogue import CATALOGUE, SITES
+from jaxident.effects.coordinates import natural
 
 SIGNIFICANT, SHARE = 20.0, 0.05
 """Fall of -log p that terms in no catalogue must bring beyond the best set, and their part of all that is explained,
@@ -150,7 +151,7 @@ def slip_of_drive(finding: Finding) -> float:
     law = finding.law
     if law.slip is None or law.slip_time is None:
         return 0.0
-    full = np.abs(finding.fit.vector[2:6]).reshape(2, 2).sum(axis=1)
+    full = np.abs(natural(finding.fit.vector)[2:6]).reshape(2, 2).sum(axis=1)
     return float(np.max(np.array(law.slip) / full) * np.sqrt(law.slip_time / SLOW))
 
 

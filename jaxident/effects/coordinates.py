@@ -20,9 +20,12 @@ from jaxident.robot.model import Model, require_physical
 TYPICAL = np.log([TYPICAL_RATE, TYPICAL_RATE])
 """Both rates of a typical robot, as a search has them: logarithms."""
 
+REACH = 1.0
+"""Time [s] after which speeds are compared (`pace`): about that of a window. No other was tried."""
+
 NOMINAL = ("rate_1", "rate_2", "gain_11", "gain_12", "gain_21", "gain_22", "dead_zone_r", "dead_zone_l",
            "coupling_1", "coupling_2")  # fmt: skip
-"""The nominal unknowns; rates stand as their logarithms."""
+"""The nominal unknowns; rates stand as their logarithms, gains and couplings for a typical robot (`pace`)."""
 
 SEARCHED: dict[str, Search] = {name: each.search for name, each in CATALOGUE.items() if each.search is not None}
 """How each effect that shapes the mean path is looked for; the random ones are in the noise."""
@@ -71,10 +74,9 @@ the left a marker is nothing tells, but an effect that acts on the speeds of axl
 ACCELERATIONS = [
     (name, c.name, c.over_rate) for name, own in COORDINATES.items() for c in own if c.over_rate is not None
 ]
-"""Effect, coordinate and channel of accelerations. They are searched for as they would be at TYPICAL_RATE: times that
-over the robot's rate. A settled speed shows an acceleration over the rate, and where a lag hides the rate poses tell
-neither alone. On half a Create's log the loss in turns over the rate was known to 2.6 %, the loss to 8 %. A table that
-was linear in the loss took for doubtful what -log p rose by 4800 without."""
+"""Effect, coordinate and channel of accelerations. They stand for a typical robot, too (`pace`). On half a Create's log
+the loss in turns over the rate was known to 2.6 %, the loss to 8 %. A table that was linear in the loss took for
+doubtful what -log p rose by 4800 without."""
 
 ON_SPEEDS = {name for name, search in SEARCHED.items() if search.on_speeds}
 """Such effects; play that coasts acts on speeds, too, but tells too little."""
@@ -93,6 +95,18 @@ PLACES = {
 
 SIZE = len(NOMINAL) + len(PLACES)
 _ALL = [coordinate for coordinates in COORDINATES.values() for coordinate in coordinates]
+
+
+def pace(rates: Array, numbers: Any = np) -> Any:
+    """What a typical robot's accelerations are multiplied with, so that a robot with some rates (2,), logarithms, comes
+    as far from rest in REACH: (1 - exp(-r T)) / r of the one over that of the other. numbers: NumPy or jax.numpy.
+
+    Poses show speeds that are reached. Where a robot settles fast, or a lag hides how fast, they tell an acceleration
+    over the rate better than either. In gains as they are, 60 steps of a fit to half a Create's log zigzagged along a
+    valley, their rates by a fifth to and fro, and did not arrive.
+    """
+    rate = numbers.exp(rates)
+    return rate / numbers.expm1(-REACH * rate) * (np.expm1(-REACH * TYPICAL_RATE) / TYPICAL_RATE)
 
 
 def neutral_vector(nominal: Array) -> np.ndarray:
@@ -122,10 +136,10 @@ def sizes() -> np.ndarray:
 
 def by_effect(vector: Array) -> Mapping[str, dict[str, Any]]:
     """The coordinates of a vector (SIZE,) by effect, then name; accelerations (`over_rate`) as those of this robot."""
-    faster = jnp.exp(vector[:2]) / TYPICAL_RATE
+    times = pace(vector[:2], jnp)
     whole = {name: {c.name: vector[PLACES[name, c.name]] for c in own} for name, own in COORDINATES.items()}
     for name, key, channel in ACCELERATIONS:
-        whole[name][key] = faster[channel] * whole[name][key]
+        whole[name][key] = times[channel] * whole[name][key]
     return whole
 
 
@@ -145,26 +159,26 @@ def seeds(name: str, duration: float) -> list[Seed]:
 
 def to_catalogue(name: str, values: Mapping[str, float], rates: Array = TYPICAL) -> dict[str, float]:
     """Coordinates of one effect as the parameters that the catalogue has; rates (2,): logarithms, of the robot."""
-    transform, faster = SEARCHED[name].transform, _faster(name, rates)
-    values = {key: float(value) * faster.get(key, 1.0) for key, value in values.items()}
+    transform, times = SEARCHED[name].transform, _paces(name, rates)
+    values = {key: float(value) * times.get(key, 1.0) for key, value in values.items()}
     return values if transform is None else transform.to_catalogue(values)
 
 
 def from_catalogue(name: str, values: Mapping[str, float], rates: Array = TYPICAL) -> dict[str, float]:
     """The coordinates of an effect given by the parameters that the catalogue has; rates (2,): logarithms, of the
     robot."""
-    transform, faster = SEARCHED[name].transform, _faster(name, rates)
+    transform, times = SEARCHED[name].transform, _paces(name, rates)
     if transform is None:
         found = {c.name: values.get(c.name, c.neutral) for c in COORDINATES[name]}
     else:
         found = transform.from_catalogue(values)
-    return {key: value / faster.get(key, 1.0) for key, value in found.items()}
+    return {key: value / times.get(key, 1.0) for key, value in found.items()}
 
 
-def _faster(name: str, rates: Array) -> dict[str, float]:
-    """How many times faster than a typical robot one with some rates settles, for coordinates that stand for such."""
+def _paces(name: str, rates: Array) -> dict[str, float]:
+    """The pace of a robot with some rates, for those coordinates of an effect that are accelerations."""
     chosen = {key: channel for effect, key, channel in ACCELERATIONS if effect == name}
-    return {key: float(np.exp(rates[channel])) / TYPICAL_RATE for key, channel in chosen.items()}
+    return {key: float(pace(rates)[channel]) for key, channel in chosen.items()}
 
 
 def unit_factors(name: str, largest: float) -> dict[str, float]:
@@ -181,13 +195,23 @@ def unit_factors(name: str, largest: float) -> dict[str, float]:
 def nominal_vector(drive: Physical, dead_zone: Array) -> np.ndarray:
     """The nominal coordinates (10,) of a drive and dead zones (2,)."""
     coupling = np.zeros(2) if drive.coupling is None else np.asarray(drive.coupling)
-    parts = np.log(np.asarray(drive.rate)), np.ravel(np.asarray(drive.gain)), np.asarray(dead_zone), coupling
-    return np.concatenate(parts)
+    rates = np.log(np.asarray(drive.rate))
+    gain = np.asarray(drive.gain) / pace(rates)[:, None]
+    return np.concatenate([rates, np.ravel(gain), np.asarray(dead_zone), coupling / pace(rates)])
 
 
 def natural(nominal: Array) -> np.ndarray:
-    """The nominal coordinates with rates in 1/s."""
-    return np.concatenate([np.exp(nominal[:2]), nominal[2:10]])
+    """The nominal parameters (10,) that some coordinates stand for: rates in 1/s, accelerations of the robot itself."""
+    times = pace(nominal[:2])
+    return np.concatenate(
+        [np.exp(nominal[:2]), nominal[2:6] * np.repeat(times, 2), nominal[6:8], nominal[8:10] * times]
+    )
+
+
+def natural_slopes(nominal: Array) -> np.ndarray:
+    """Derivatives (10, 10) of the nominal parameters by their coordinates."""
+    steps = 1e-6 * np.eye(len(NOMINAL))
+    return np.stack([(natural(nominal[:10] + step) - natural(nominal[:10] - step)) / 2e-6 for step in steps], axis=1)
 
 
 COMMAND_POWERS = np.array([0, 0, -1, -1, -1, -1, 1, 1, 0, 0])

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import jax.numpy as jnp
 
 from jaxident.array_types import Array, Pose, State, Wheels
+from jaxident.effects.coordinates import pace
 from jaxident.effects.discovered import Here, pushed, rolled, shifted, sideways, turned
 from jaxident.effects.fast_input import SUBSTEPS
 from jaxident.effects.friction import slide
@@ -53,7 +54,9 @@ class Row(NamedTuple):
 
 def drive_of(vector: Array) -> Physical:
     """The nominal drive of a vector of coordinates (SIZE,)."""
-    return Physical(jnp.exp(vector[:2]), ((vector[2], vector[3]), (vector[4], vector[5])), vector[8:10])
+    along, heading = times = pace(vector[:2], jnp)
+    gain = (along * vector[2], along * vector[3]), (heading * vector[4], heading * vector[5])
+    return Physical(jnp.exp(vector[:2]), gain, times * vector[8:10])
 
 
 def lags_of(drive: Physical, part: Array) -> list[Lag]:

@@ -241,7 +241,9 @@ def test_answers_are_what_least_squares_leaves_of_them(plain):
     data, nominal = plain
     found = answers(data, nominal, 1.0)
     vector = nominal.vector.copy()
-    vector[PLACES["turn_loss", "loss"]] = from_catalogue("turn_loss", CATALOGUE["turn_loss"].typical(), vector)["loss"]
+    vector[PLACES["turn_loss", "loss"]] = from_catalogue("turn_loss", CATALOGUE["turn_loss"].typical(), vector[:2])[
+        "loss"
+    ]
     change = nominal.linear.residual - follow(vector[None], nominal.starts[None], data.windows)[0]
     count, numbers = change.shape
     white = [data.whitener[k] for k in range(count)]

@@ -12,13 +12,14 @@ from jaxident.diagnosis.decide import decide
 from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.posterior import alike, judge, lawful_probability, slip_of_drive, unexplained_probability
 from jaxident.diagnosis.simulator import Simulator
-from jaxident.effects.coordinates import COORDINATES
+from jaxident.effects.coordinates import COORDINATES, nominal_vector
+from jaxident.robot.drive import Physical
 
 NONE: dict[str, float] = {}
 GAP = made_up("effects").gap
 OPEN = GAP._replace(after=GAP.refitted)
 
-DRIVE = np.array([1.0, 1.5, 0.5, 0.5, 5.0, -5.0])
+DRIVE = nominal_vector(Physical(np.exp([1.0, 1.5]), np.array([[0.5, 0.5], [5.0, -5.0]])), np.zeros(2))[:6]
 
 
 def drives(finding, drive):
@@ -156,7 +157,7 @@ def test_slip_that_is_a_small_part_of_what_an_effect_explains_is_not():
 def test_slip_is_held_against_the_drive_of_the_robot_and_not_of_a_nominal_model_that_bends():
     law = Law(1e-3, 5e-3, (0.01, 0.1), 0.2)
     robot = finding({("turn_loss",): 900.0}, ("turn_loss",))._replace(law=law)
-    bent = drives(robot, 0.1 * DRIVE)
+    bent = drives(robot, [*DRIVE[:2], *(0.1 * DRIVE[2:])])
     assert slip_of_drive(robot._replace(nominal=bent.fit)) == pytest.approx(0.01)
     assert slip_of_drive(bent) == pytest.approx(0.1)
 

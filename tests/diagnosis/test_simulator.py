@@ -11,7 +11,7 @@ from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.preparation.pose_screening import Frames
 from jaxident.diagnosis.preparation.translate import abreast_of_marker
 from jaxident.diagnosis.simulator import Simulator, _direct, as_simulator, check_units, is_noisy, rarer, shared
-from jaxident.effects.coordinates import PLACES, free_places, neutral_vector
+from jaxident.effects.coordinates import PLACES, free_places, neutral_vector, nominal_vector, pace
 from jaxident.errors import InputError
 from jaxident.log import make_log
 from jaxident.robot.drive import Physical
@@ -64,11 +64,13 @@ def test_a_model_with_effects_is_a_simulator():
     gain = np.array([[0.01, 0.01], [0.1, -0.1]])
     model = Model(0.05, Physical(np.array([2.0, 3.0]), gain, None), np.array([9.0, 4.5]), effects=effects)
     found = as_simulator(model, drive(command=100.0))
-    expected = neutral_vector(np.concatenate([np.log([2.0, 3.0]), 90.0 * gain.ravel(), [0.1, 0.05, 0.0, 0.0]]))
+    drive_here = Physical(np.array([2.0, 3.0]), 90.0 * gain, None)
+    expected = neutral_vector(nominal_vector(drive_here, np.array([0.1, 0.05])))
+    slower = pace(np.log([2.0, 3.0]))[0]
     expected[PLACES["input_saturation", "level"]] = 0.8
     expected[PLACES["transport_delay", "delay"]] = 0.12
-    expected[PLACES["slope", "y"]] = 0.3  # a robot of 2 1/s settles at what one of 3 1/s would under 0.3
-    expected[PLACES["mass_offset", "along"]] = 0.15
+    expected[PLACES["slope", "y"]] = 0.2 / slower
+    expected[PLACES["mass_offset", "along"]] = 0.1 / slower
     np.testing.assert_allclose(found.vector, expected, atol=1e-12)
     assert found.effects == tuple(effect.name for effect in effects)
 

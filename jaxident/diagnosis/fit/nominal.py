@@ -20,7 +20,7 @@ from jaxident.diagnosis.motion.responses import respond
 from jaxident.diagnosis.motion.windows import Piece, Windows
 from jaxident.diagnosis.noise.law import Law, first_law, white_whitener, whitener_of
 from jaxident.diagnosis.noise.sizing import size_noise
-from jaxident.effects.coordinates import NOMINAL, neutral_vector, nominal_vector
+from jaxident.effects.coordinates import NOMINAL, natural, natural_slopes, neutral_vector, nominal_vector
 from jaxident.errors import InputError
 from jaxident.estimation.poses.maximum_likelihood import begin
 from jaxident.estimation.poses.noise_law import CLEAR
@@ -83,8 +83,9 @@ def coasts(fit: Solution, windows: Windows, unexplained: bool) -> np.ndarray:
     speeds show how a robot answers: beside them no rate is doubted."""
     if windows.wheels is not None:
         return np.zeros(2, bool)
-    rate, gain = np.exp(fit.vector[:2]), fit.vector[2:6].reshape(2, 2)
-    deviation = np.sqrt(np.diagonal(fit.covariance)[2:6]).reshape(2, 2)
+    rate, gain = np.exp(fit.vector[:2]), natural(fit.vector)[2:6].reshape(2, 2)
+    slope = natural_slopes(fit.vector)[2:6]
+    deviation = np.sqrt(np.sum(slope @ fit.covariance[:10, :10] * slope, axis=1)).reshape(2, 2)
     signs = np.sign(gain[:, 0] * gain[:, 1]) == np.prod(SIGNS, axis=1)
     driven = signs & np.all(np.abs(gain) > CLEAR * deviation, axis=1)
     return coasting(rate, float(np.max(windows.step.sum(axis=0))), driven, unexplained)

@@ -9,7 +9,17 @@ from jaxident.diagnosis.fit.prior import GAINS, as_held, as_uncertain_as_prior, 
 from jaxident.diagnosis.motion.linear import Linear, follow, gram, linearise, normal
 from jaxident.diagnosis.motion.rims import Rims, rim_speeds
 from jaxident.diagnosis.motion.windows import Windows
-from jaxident.effects.coordinates import INSTANTS, NOMINAL, PLACES, STEPPED, free_places, limits, neutral_vector, sizes
+from jaxident.effects.coordinates import (
+    INSTANTS,
+    NOMINAL,
+    PLACES,
+    STEPPED,
+    free_places,
+    limits,
+    natural,
+    neutral_vector,
+    sizes,
+)
 from jaxident.effects.effect import EDGE
 
 MOST_STEPS = 20
@@ -75,7 +85,8 @@ def refit(data: Data, vector: Array, starts: Array, effects: tuple[str, ...], ho
     cost, damping = 0.5 * products[-1, -1] + _taken(data, linear), 1e-4
     for step_number in range(1, most + 1):
         step, promised = _step(products, vector[places], low, high, damping)
-        if promised < ENOUGH and step_number > 1:
+        by_starts = cost - 0.5 * products[-1, -1]
+        if promised + by_starts < ENOUGH and step_number > 1:
             break
         new_vector = vector.copy()
         new_vector[places] = np.clip(vector[places] + step, low, high)
@@ -102,7 +113,8 @@ def refit(data: Data, vector: Array, starts: Array, effects: tuple[str, ...], ho
 def speeds_up(vector: Array) -> bool:
     """Whether the robot of a vector (SIZE,) speeds up by itself, without a command: its coupling outdoes its rates. On
     three runs of a Husky's log a fit ended at such a one."""
-    return bool(vector[COUPLING[0]] * vector[COUPLING[1]] > np.exp(vector[0] + vector[1]))
+    one, other = natural(vector)[COUPLING]
+    return bool(one * other > np.exp(vector[0] + vector[1]))
 
 
 def _calmer(vector: Array) -> tuple[np.ndarray, np.ndarray]:

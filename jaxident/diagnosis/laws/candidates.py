@@ -17,6 +17,7 @@ from jaxident.diagnosis.motion.linear import motion_of
 from jaxident.diagnosis.motion.paths import left_behind
 from jaxident.diagnosis.motion.responses import Responses
 from jaxident.diagnosis.motion.windows import Windows, with_room
+from jaxident.effects.coordinates import natural
 from jaxident.effects.law_kinds import (
     AHEAD,
     ALONG,
@@ -90,7 +91,7 @@ def path_of(fit: Solution, windows: Windows) -> Path:
     """The signals along the path of a fit."""
     motion = motion_of(fit.vector, fit.starts, windows)
     x, y, theta, v, w, push = (np.asarray(part) for part in motion)
-    rates, gain = np.exp(fit.vector[:2]), fit.vector[2:6].reshape(2, 2)
+    rates, gain = np.exp(fit.vector[:2]), natural(fit.vector)[2:6].reshape(2, 2)
     speeds = np.stack([rates[0] * v, rates[1] * w], axis=-1) @ np.linalg.pinv(gain).T
     step, past = np.asarray(windows.step).T, _left_behind(with_room(windows._replace(laws=None)))
     past = jax.tree.map(lambda part: np.asarray(part)[..., : len(step)], past)

@@ -13,6 +13,7 @@ from jaxident.diagnosis.fit.refit import Data, Solution
 from jaxident.diagnosis.motion.linear import without_starts
 from jaxident.diagnosis.motion.responses import modelled_path, modelled_speeds, respond
 from jaxident.diagnosis.preparation.steps import past_zone
+from jaxident.effects.coordinates import natural
 
 LATEST = 3
 """Rows by which a change may be late: four in a row are lost too rarely to matter."""
@@ -88,7 +89,7 @@ def _changes(data: Data, solution: Solution) -> _Changes:
     window, row, late = _changed(data)
     before = windows.command[windows.first[window] + row - 1, windows.run[window]]
     now = windows.command[windows.first[window] + row, windows.run[window]]
-    zone, gain = solution.vector[6:8], solution.vector[2:6].reshape(2, 2)
+    zone, gain = solution.vector[6:8], natural(solution.vector)[2:6].reshape(2, 2)
     force = (past_zone(now, zone) - past_zone(before, zone)) @ gain.T
     v, w = modelled_speeds(modelled_path(solution.linear.residual, windows), windows)
     sizes = np.abs(np.column_stack([v[window, row], w[window, row], force]))

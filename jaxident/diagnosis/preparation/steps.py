@@ -9,6 +9,7 @@ import numpy as np
 from jaxident.array_types import Array
 from jaxident.diagnosis.fit.refit import Data, Solution
 from jaxident.diagnosis.motion.responses import Responses, respond
+from jaxident.effects.coordinates import natural
 
 TEETH = np.arange(2.2, 50.0, 0.08)
 """Steps in the largest command."""
@@ -48,7 +49,7 @@ def _slopes(data: Data, solution: Solution) -> np.ndarray:
     windows = data.windows
     responses = respond(np.exp(solution.vector[:2]), solution.linear.residual, windows)
     along, heading = pulls(data, solution.linear.residual, responses)
-    gain = solution.vector[2:6].reshape(2, 2)
+    gain = natural(solution.vector)[2:6].reshape(2, 2)
     wanted = along[..., None] * gain[0] + heading[..., None] * gain[1]
     places = np.minimum(windows.first[:, None] + np.arange(wanted.shape[1]), len(windows.command) - 1)
     total = np.zeros(windows.command.shape)

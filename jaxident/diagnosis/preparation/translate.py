@@ -19,6 +19,8 @@ from jaxident.effects.coordinates import (
     PLACES,
     limits,
     natural,
+    natural_slopes,
+    nominal_vector,
     to_catalogue,
     unit_factors,
 )
@@ -31,13 +33,13 @@ from jaxident.robot.noise import Noise
 def abreast_of_marker(vector: Array) -> np.ndarray:
     """Coordinates (SIZE,) of the same robot seen from the point of its axle abreast of its marker: the speed there,
     v - b w, in place of v, and no offset of the marker to the left."""
-    left = vector[PLACES[ASIDE]]
-    rates, gain, (c1, c2) = np.exp(vector[:2]), np.reshape(vector[2:6], (2, 2)), vector[8:10]
+    left, robot = vector[PLACES[ASIDE]], natural(vector)
+    rates, gain, (c1, c2) = robot[:2], np.reshape(robot[2:6], (2, 2)), robot[8:10]
     seen, back = np.array([[1.0, -left], [0.0, 1.0]]), np.array([[1.0, left], [0.0, 1.0]])
     decay = seen @ np.array([[rates[0], -c1], [-c2, rates[1]]]) @ back
+    drive = Physical(np.maximum(np.diagonal(decay), 1e-9), seen @ gain, -decay[[0, 1], [1, 0]])
     found = np.array(vector, float)
-    found[:2], found[2:6] = np.log(np.maximum(np.diagonal(decay), 1e-9)), (seen @ gain).ravel()
-    found[8:10], found[PLACES[ASIDE]] = (-decay[0, 1], -decay[1, 0]), 0.0
+    found[: len(NOMINAL)], found[PLACES[ASIDE]] = nominal_vector(drive, vector[6:8]), 0.0
     return found
 
 
@@ -50,8 +52,8 @@ def parameters_of(solution: Solution, largest: float) -> tuple[tuple[str, ...], 
     """Names, values and standard deviations of the nominal parameters in the user's unit."""
     factor = float(largest) ** COMMAND_POWERS
     values = natural(solution.vector) * factor
-    slope = np.concatenate([np.exp(solution.vector[:2]), np.ones(8)]) * factor
-    deviation = np.sqrt(np.diagonal(solution.covariance)[:10]) * np.abs(slope)
+    slope = factor[:, None] * natural_slopes(solution.vector)
+    deviation = np.sqrt(np.sum(slope @ solution.covariance[:10, :10] * slope, axis=1))
     return NOMINAL, values.tolist(), deviation.tolist()
 
 

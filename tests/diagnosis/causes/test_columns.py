@@ -303,7 +303,7 @@ def test_a_table_tells_what_a_loss_in_turns_brings_where_a_lag_hides_the_rate():
     that was linear in the loss gave it 1.5, where -log p rises by 450."""
     loss, law, effects = PLACES["turn_loss", "loss"], Law(2e-3, 2e-2), ("turn_loss", "motor_lag")
     vector = robot_with({("turn_loss", "loss"): 2.0, ("motor_lag", "time_constant"): 0.15})
-    vector[0], vector[2:4] = np.log(30.0), 10.0 * vector[2:4]
+    vector[0] = np.log(30.0)
     windows = windows_of(vector, law=law)
     data = Data(windows, white_whitener(law, windows))
     fit = refit(data, vector, np.zeros((5, len(windows.run))), effects)
@@ -323,7 +323,7 @@ def test_accelerations_stand_for_a_robot_of_the_typical_rate():
     assert len(ACCELERATIONS) > 4
     slow, fast = VECTOR.copy(), VECTOR.copy()
     for vector, rate in ((slow, 100.0), (fast, 200.0)):
-        vector[:2], vector[2:6] = np.log(rate), VECTOR[2:6] * rate / 10.0
+        vector[:2], vector[2:6] = np.log(rate), 0.3 * VECTOR[2:6]
     for name, key, _ in ACCELERATIONS:
         size = {key: 0.3 * sizes()[PLACES[name, key]]}
         (plain, moved), (faster, alike) = ([way(one), way(seeded(one, name, size))] for one in (slow, fast))

@@ -10,7 +10,7 @@ from jaxident.diagnosis.fit.nominal import coasts, first_starts, hold_rates, low
 from jaxident.diagnosis.fit.refit import Data, refit
 from jaxident.diagnosis.motion.windows import cut
 from jaxident.diagnosis.noise.law import Law, white_whitener
-from jaxident.effects.coordinates import neutral_vector, nominal_vector
+from jaxident.effects.coordinates import natural, natural_slopes, neutral_vector, nominal_vector
 from jaxident.estimation.poses.prior import RATE, RATE_SPREAD
 from jaxident.log import Log, join
 from jaxident.robot.drive import Physical
@@ -53,13 +53,14 @@ def test_a_fit_in_a_wrong_valley_gives_way_to_a_lower_one():
     assert np.exp(wrong.vector[0]) < 0.1 * DRIVE.rate[0]
     found = lower_valley(wrong, windows)
     assert np.exp(found.vector[:2]) == pytest.approx(DRIVE.rate, rel=0.02)
-    assert found.vector[2:6] == pytest.approx(np.ravel(DRIVE.gain), rel=0.1)
+    assert natural(found.vector)[2:6] == pytest.approx(np.ravel(DRIVE.gain), rel=0.1)
     assert lower_valley(right, windows) is right
 
 
 def fit_with(rates, gain, deviation=0.01):
-    vector = neutral_vector(np.concatenate([np.log(rates), np.ravel(gain), np.zeros(4)]))
-    return SimpleNamespace(vector=vector, covariance=np.eye(10) * deviation**2)
+    vector = neutral_vector(nominal_vector(Physical(np.array(rates), np.array(gain)), np.zeros(2)))
+    back = deviation * np.linalg.inv(natural_slopes(vector))
+    return SimpleNamespace(vector=vector, covariance=back @ back.T)
 
 
 @pytest.mark.parametrize(
@@ -90,10 +91,10 @@ def test_a_rate_that_is_held_is_the_priors_and_as_uncertain():
     assert np.exp(held.vector[1]) == pytest.approx(RATE, rel=1e-4)
     assert held.vector[8:10] == pytest.approx([0.0, 0.0], abs=1e-4)
     assert np.sqrt(held.covariance[1, 1]) == pytest.approx(RATE_SPREAD)
-    steady, slower = (fit.vector[4:6] / np.exp(fit.vector[1]) for fit in (found, held))
+    steady, slower = (natural(fit.vector)[4:6] / np.exp(fit.vector[1]) for fit in (found, held))
     assert slower == pytest.approx(steady, rel=0.1), "the steady turn rate is told whatever the rate"
-    across = held.covariance[1, 4:6] / held.covariance[1, 1]
-    assert across == pytest.approx(held.vector[4:6], rel=0.2), "a faster robot has larger gains"
+    across = (natural_slopes(held.vector) @ held.covariance)[4:6, 1] / held.covariance[1, 1]
+    assert across == pytest.approx(natural(held.vector)[4:6], rel=0.2), "a faster robot has larger gains"
 
 
 def test_rates_are_held_as_a_given_model_has_them():

@@ -11,7 +11,7 @@ from jaxident.diagnosis.motion.windows import FREE
 from jaxident.diagnosis.noise.law import Law
 from jaxident.diagnosis.preparation.translate import effect_of, effect_values, to_model
 from jaxident.effects.catalogue import CATALOGUE
-from jaxident.effects.coordinates import COORDINATES, PLACES, free_places, neutral_vector, vector_of
+from jaxident.effects.coordinates import COORDINATES, PLACES, free_places, neutral_vector, pace, vector_of
 from jaxident.log import make_log
 from jaxident.robot.drive import Physical
 from jaxident.robot.model import Effect, Model
@@ -70,11 +70,11 @@ def test_a_model_leads_to_coordinates_and_back_whatever_its_rates(name):
 
 
 def test_a_loss_is_as_uncertain_as_its_rate_makes_it():
-    """Where the coordinate is known and the rate to 10 %, the loss is known to 10 %."""
+    """Where the coordinate is known and the rate to 10 %, the loss is known to 10 %: this robot settles at once."""
     places, vector = free_places(("turn_loss",)), neutral_vector(np.zeros(10))
-    vector[0], vector[PLACES["turn_loss", "loss"]] = np.log(6.0), 0.5
+    vector[0], vector[PLACES["turn_loss", "loss"]] = np.log(60.0), 0.5
     variance = np.full(len(places), 1e-10)
     variance[places.index(0)] = 0.01
     found = effect_of("turn_loss", Solution(vector, None, places, None, 0.0, np.diag(variance), 1), 1.0)
-    assert found.parameters["loss"] == pytest.approx(1.0)
-    assert found.standard_deviation["loss"] == pytest.approx(0.1, rel=1e-3)
+    assert found.parameters["loss"] == pytest.approx(0.5 * pace(np.log([60.0, 1.0]))[0])
+    assert found.standard_deviation["loss"] == pytest.approx(0.1 * found.parameters["loss"], rel=1e-3)
