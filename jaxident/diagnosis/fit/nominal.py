@@ -33,7 +33,7 @@ SETTLES = 4.0
 """Time constants within a window of the robot that follows its commands: it has settled at the end of one. No other
 number was tried."""
 STEPS = 60
-"""Of each of the two fits: on that half log the second needs 38."""
+"""Of each of the two fits: of twenty to halves of Creates' logs the longest needed 28."""
 BETTER = 1.0
 """Fall of -log p beyond which another valley is taken: less is no difference: a refit ends where a
 step promises less than 0.05."""
