@@ -9,9 +9,20 @@ from jaxident.diagnosis.decide import compare_parameters
 from jaxident.diagnosis.fit.refit import Solution
 from jaxident.diagnosis.motion.windows import FREE
 from jaxident.diagnosis.noise.law import Law
-from jaxident.diagnosis.preparation.translate import effect_of, effect_values, to_model
+from jaxident.diagnosis.preparation.translate import effect_of, effect_values, in_user_units, to_model
 from jaxident.effects.catalogue import CATALOGUE
-from jaxident.effects.coordinates import COORDINATES, PLACES, free_places, neutral_vector, pace, vector_of
+from jaxident.effects.coordinates import (
+    COORDINATES,
+    PLACES,
+    REACH,
+    free_places,
+    natural,
+    natural_slopes,
+    neutral_vector,
+    pace,
+    vector_of,
+)
+from jaxident.effects.fast_motion import drive_of
 from jaxident.log import make_log
 from jaxident.robot.drive import Physical
 from jaxident.robot.model import Effect, Model
@@ -78,3 +89,32 @@ def test_a_loss_is_as_uncertain_as_its_rate_makes_it():
     found = effect_of("turn_loss", Solution(vector, None, places, None, 0.0, np.diag(variance), 1), 1.0)
     assert found.parameters["loss"] == pytest.approx(0.5 * pace(np.log([60.0, 1.0]))[0])
     assert found.standard_deviation["loss"] == pytest.approx(0.1 * found.parameters["loss"], rel=1e-3)
+
+
+def test_the_follower_and_the_files_have_the_same_robot():
+    """From coordinates for commands over 2 units, at a slow and a fast rate."""
+    drive = Physical(np.array([0.05, 40.0]), np.array([[1.2, 1.1], [9.0, -8.5]]), np.array([0.1, -2.0]))
+    dead_zone = np.array([0.2, 0.3])
+    vector = vector_of(Model(0.03, drive, dead_zone), 2.0)
+    told = [*drive.rate, *np.ravel(drive.gain), *dead_zone, *drive.coupling]
+    assert in_user_units(vector, 2.0) == pytest.approx(told, rel=1e-12)
+    followed = drive_of(vector)
+    robot = [*followed.rate, *np.ravel(followed.gain), *vector[6:8], *followed.coupling]
+    assert np.array(robot) == pytest.approx(natural(vector), rel=1e-12)
+
+
+def test_robots_alike_in_coordinates_come_as_far_from_rest():
+    """After REACH under the same push, whatever their rates."""
+    reached = []
+    for rates in ([0.02, 0.5], [3.0, 3.0], [9.0, 200.0]):
+        vector = neutral_vector(np.concatenate([np.log(rates), [0.5, 0.4, 9.0, -8.5], np.zeros(4)]))
+        robot = natural(vector)
+        reached.append(robot[[2, 4]] * -np.expm1(-robot[:2] * REACH) / robot[:2])
+    np.testing.assert_allclose(reached, np.tile(reached[1], (3, 1)), rtol=1e-9)
+
+
+def test_slopes_of_the_nominal_parameters_are_those_of_small_steps():
+    vector = np.concatenate([np.log([0.7, 11.0]), [0.5, 0.4, 9.0, -8.5, 0.1, 0.2, 0.3, -1.0]])
+    step = 1e-3 * np.random.default_rng(0).normal(size=10)
+    moved = natural(vector + step) - natural(vector - step)
+    np.testing.assert_allclose(2.0 * natural_slopes(vector) @ step, moved, rtol=1e-4)
