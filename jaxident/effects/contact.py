@@ -172,7 +172,7 @@ RECORDS = (
                     Parameter("direction", "rad", 0.0, (-3.15, 3.15), 0.7, shape=True)),
         channels=(ALONG,),
         act=slope, fast=slope_by_components,
-        search=Search((signed("x", 3.0, over_rate=0), signed("y", 3.0, over_rate=0)),
+        search=Search((signed("x", 3.0, accelerates=0), signed("y", 3.0, accelerates=0)),
                       Transform(_to_slope, _from_slope)),
     ),
 )  # fmt: skip

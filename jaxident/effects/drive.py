@@ -83,8 +83,8 @@ RECORDS = (
                     Parameter("heading", "1/rad", 0.0, (0.0, 2.0), 0.3, least=0.0)),
         channels=BOTH,
         act=quadratic_drag, confused_with=("coulomb_friction", "turn_loss"),
-        search=Search((Coordinate("along", 0.0, 0.0, 100.0, 3.0, over_rate=0), positive("heading", 5.0, over_rate=1)),
-                      on_speeds=True),
+        search=Search((Coordinate("along", 0.0, 0.0, 100.0, 3.0, accelerates=0),
+                       positive("heading", 5.0, accelerates=1)), on_speeds=True),
     ),
     EffectRecord(
         name="mass_offset", site="drive", stage="body", step=statements.MASS_OFFSET,
@@ -97,7 +97,7 @@ RECORDS = (
                     Parameter("heading", "1/m", 0.0, (-20.0, 20.0), 3.0)),
         channels=BOTH,
         act=mass_offset, confused_with=("turn_loss",),
-        search=Search((signed("along", 0.4, over_rate=0), signed("heading", 40.0, over_rate=1)), on_speeds=True),
+        search=Search((signed("along", 0.4, accelerates=0), signed("heading", 40.0, accelerates=1)), on_speeds=True),
     ),
     EffectRecord(
         name="turn_loss", site="drive", stage="body", step=statements.TURN_LOSS,
@@ -107,7 +107,7 @@ RECORDS = (
         source="castor scrub; Wong 2008, Theory of Ground Vehicles, ch. 6",
         parameters=(Parameter("loss", "1/rad", 0.0, (0.0, 20.0), 0.1, least=0.0),), channels=(ALONG,),
         act=turn_loss, confused_with=("quadratic_drag", "mass_offset"), sharp=True,
-        search=Search((Coordinate("loss", 0.0, 0.0, 50.0, 0.6, over_rate=0),), on_speeds=True),
+        search=Search((Coordinate("loss", 0.0, 0.0, 50.0, 0.6, accelerates=0),), on_speeds=True),
     ),
 )  # fmt: skip
 """The effects of this site."""

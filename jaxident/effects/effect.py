@@ -97,7 +97,7 @@ class Coordinate(NamedTuple):
     follow it in jumps, or it chooses between two forms, so that it is looked for on a grid alone. unseen: no log tells
     it, unless an effect acts on the speeds of axle or wheels. by_drive: above 0, what drives the wheels depends on the
     drive as well. reach: where -log p has many valleys, how far each further search for the best goes, in the
-    coordinate's unit, or if `relative` as a part of it. below: no robot has values from here on. over_rate: an
+    coordinate's unit, or if `relative` as a part of it. below: no robot has values from here on. accelerates: an
     acceleration along (0) or in heading (1), told for a robot of the typical rate (`coordinates.ACCELERATIONS`).
     """
 
@@ -114,7 +114,7 @@ class Coordinate(NamedTuple):
     reach: tuple[float, ...] = ()
     relative: bool = False
     below: float = math.inf
-    over_rate: int | None = None
+    accelerates: int | None = None
 
 
 def signed(name: str, high: float, **more: Any) -> Coordinate:

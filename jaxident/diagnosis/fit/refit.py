@@ -25,7 +25,7 @@ from jaxident.effects.effect import EDGE
 MOST_STEPS = 20
 """Of one refit; what fits arrives in two to nine, what crawls is mostly an effect that is not there."""
 ENOUGH = 0.05
-"""Promised fall of -log p below which the search ends."""
+"""Promised fall of -log p, by coordinates and start states, below which the search ends."""
 LONGEST = 0.5
 """A step changes a rate by at most this much, as a logarithm."""
 LONGEST_GAIN = 1.0
