@@ -299,8 +299,8 @@ def test_what_a_term_and_an_effect_can_both_do_counts_for_an_owner(beside):
 
 
 def test_a_table_tells_what_a_loss_in_turns_brings_where_a_lag_hides_the_rate():
-    """A Create's speeds settle as its lag says. Its loss in turns, which a fit cannot do without, was dropped: a table
-    that was linear in the loss gave it 1.5, where -log p rises by 450."""
+    """A Create's loss in turns was dropped so. A table that was linear in the loss itself gave that of this robot 1.5,
+    where -log p rises by 450 without."""
     loss, law, effects = PLACES["turn_loss", "loss"], Law(2e-3, 2e-2), ("turn_loss", "motor_lag")
     vector = robot_with({("turn_loss", "loss"): 2.0, ("motor_lag", "time_constant"): 0.15})
     vector[0] = np.log(30.0)
