@@ -76,8 +76,8 @@ ACCELERATIONS = [
     (name, c.name, c.accelerates) for name, own in COORDINATES.items() for c in own if c.accelerates is not None
 ]
 """Effect, coordinate and channel of accelerations. They stand for a typical robot, too (`pace`). On half a Create's log
-the loss in turns over the rate was known to 2.6 %, the loss to 8 %. A table that was linear in the loss took for
-doubtful what -log p rose by 4800 without."""
+the loss in turns over the rate was known to 2.6 %, the loss to 8 %. A table that was linear in the loss called it
+doubtful. A refit without it raised -log p by 4800."""
 
 ON_SPEEDS = {name for name, search in SEARCHED.items() if search.on_speeds}
 """Such effects; play that coasts acts on speeds, too, but tells too little."""
@@ -99,8 +99,9 @@ _ALL = [coordinate for coordinates in COORDINATES.values() for coordinate in coo
 
 
 def pace(rates: Array, numbers: Any = np) -> Any:
-    """What a typical robot's accelerations are multiplied with, so that a robot with some rates (2,), logarithms, comes
-    as far from rest in REACH: (1 - exp(-r T)) / r of the one over that of the other. numbers: NumPy or jax.numpy.
+    """How many times a typical robot's accelerations (2,) are those of a robot with some rates (2,), logarithms, that
+    reaches the same speeds from rest within REACH: (1 - exp(-r T)) / r of the typical rate over that of its own.
+    numbers: NumPy or jax.numpy.
 
     Poses show speeds that are reached. Where a robot settles fast, or a lag hides how fast, they tell an acceleration
     over the rate better than either. In gains as they are, 60 steps of a fit to half a Create's log zigzagged along a
@@ -207,6 +208,13 @@ def natural(nominal: Array) -> np.ndarray:
     return np.concatenate(
         [np.exp(nominal[:2]), nominal[2:6] * np.repeat(times, 2), nominal[6:8], nominal[8:10] * times]
     )
+
+
+def natural_deviations(nominal: Array, covariance: Array) -> np.ndarray:
+    """Standard deviations (10,) of the nominal parameters, from the covariance of coordinates, the nominal ones first;
+    to first order."""
+    slope = natural_slopes(nominal)
+    return np.sqrt(np.sum(slope @ covariance[: len(slope), : len(slope)] * slope, axis=1))
 
 
 def natural_slopes(nominal: Array) -> np.ndarray:

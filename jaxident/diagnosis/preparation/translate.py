@@ -19,7 +19,7 @@ from jaxident.effects.coordinates import (
     PLACES,
     limits,
     natural,
-    natural_slopes,
+    natural_deviations,
     nominal_vector,
     to_catalogue,
     unit_factors,
@@ -52,8 +52,7 @@ def parameters_of(solution: Solution, largest: float) -> tuple[tuple[str, ...], 
     """Names, values and standard deviations of the nominal parameters in the user's unit."""
     factor = float(largest) ** COMMAND_POWERS
     values = natural(solution.vector) * factor
-    slope = factor[:, None] * natural_slopes(solution.vector)
-    deviation = np.sqrt(np.sum(slope @ solution.covariance[:10, :10] * slope, axis=1))
+    deviation = natural_deviations(solution.vector, solution.covariance) * factor
     return NOMINAL, values.tolist(), deviation.tolist()
 
 

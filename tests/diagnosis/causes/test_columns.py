@@ -8,6 +8,7 @@ from jaxident.diagnosis.causes.columns import AMPLITUDE, FAR, _Column, _in_order
 from jaxident.diagnosis.causes.evidence import log_evidence, posterior_mean, worth
 from jaxident.diagnosis.causes.moves import fit_options, stands
 from jaxident.diagnosis.causes.points import differences, points_of, seeded, sizes_of
+from jaxident.diagnosis.fit.nominal import first_starts
 from jaxident.diagnosis.fit.refit import Data, refit
 from jaxident.diagnosis.motion.linear import follow, linearise
 from jaxident.diagnosis.noise.law import Law, white_whitener
@@ -298,21 +299,22 @@ def test_what_a_term_and_an_effect_can_both_do_counts_for_an_owner(beside):
     assert left[1] == pytest.approx(left[2], rel=0.05)
 
 
-def test_a_table_tells_what_a_loss_in_turns_brings_where_a_lag_hides_the_rate():
-    """A Create's loss in turns was dropped so. A table that was linear in the loss itself gave that of this robot 1.5,
-    where -log p rises by 450 without."""
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_table_tells_what_a_loss_in_turns_brings_where_a_lag_hides_the_rate(seed):
+    """A Create's loss in turns was dropped so. A table that was linear in the loss itself gave that of such a robot 0.1
+    to 3.8 on five seeds, where -log p rises by 290 to 450 without."""
     loss, law, effects = PLACES["turn_loss", "loss"], Law(2e-3, 2e-2), ("turn_loss", "motor_lag")
     vector = robot_with({("turn_loss", "loss"): 2.0, ("motor_lag", "time_constant"): 0.15})
     vector[0] = np.log(30.0)
-    windows = windows_of(vector, law=law)
+    windows = windows_of(vector, seed, law=law)
     data = Data(windows, white_whitener(law, windows))
-    fit = refit(data, vector, np.zeros((5, len(windows.run))), effects)
+    fit = refit(data, vector, first_starts(windows), effects)
     table = tabulate(data, fit, effects)
     own = worth(table, [table.here[name] for name in effects], table.here["turn_loss"])
     without = fit_options(data, table, stands(fit, effects), [table.here["motor_lag"]])
     risen = without.fit.cost - fit.cost
-    assert risen > 300.0
-    assert risen / 4.0 < own.gain < 4.0 * risen
+    assert risen > 200.0
+    assert risen / 3.0 < own.gain < 3.0 * risen
     both = [fit.places.index(place) for place in (0, loss)]
     (rate, cross), (_, size) = fit.covariance[np.ix_(both, both)]
     assert abs(cross) < 0.5 * np.sqrt(rate * size), "the loss at the typical rate is known without the rate"

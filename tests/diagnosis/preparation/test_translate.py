@@ -103,7 +103,7 @@ def test_the_follower_and_the_files_have_the_same_robot():
     assert np.array(robot) == pytest.approx(natural(vector), rel=1e-12)
 
 
-def test_robots_alike_in_coordinates_come_as_far_from_rest():
+def test_robots_alike_in_coordinates_reach_the_same_speeds():
     """After REACH under the same push, whatever their rates."""
     reached = []
     for rates in ([0.02, 0.5], [3.0, 3.0], [9.0, 200.0]):
