@@ -53,14 +53,16 @@ def commanded(log: Log, prediction, track: float, wheel: float = 1.0):
 
 
 def models(known: Log, diagnosed: bool) -> Iterator[tuple[str, bool, Model]]:
-    """Models that each method makes of a log, and whether it says that it succeeded."""
+    """Models that each method makes of a log, and whether it says that it succeeded. Behind the name of each effect
+    stands the probability that it takes part."""
     for method in METHODS:
         found = ji.identify(known, method)
         yield method, bool(found.ok), found.model
     if diagnosed:
         gap = ji.diagnose(known)
         ok = gap.verdict != "undecided"
-        names = ", ".join(effect.name for effect in gap.corrected_model.effects)
+        sure = {cause.effect: cause.probability for cause in gap.judgement.causes}
+        names = ", ".join(f"{each.name} {sure[each.name]:.2f}" for each in gap.corrected_model.effects)
         yield "diagnose, nominal", ok, gap.nominal_model
         yield f"diagnose, corrected ({names})", ok, gap.corrected_model
 
