@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from jaxident.array_types import Array
+from jaxident.effects.law_arrays import Laws
 from jaxident.estimation.poses.runs import stack_runs
 from jaxident.estimation.poses.ways import ways
 from jaxident.log import Log, join, run_begins
@@ -119,6 +120,13 @@ def uncut(commands: Array, period: float) -> Windows:
         pose=np.zeros((*t.shape, 3)), seen=np.ones(t.shape, bool), run=np.arange(count),
         first=np.zeros(count, int), row=np.zeros(count, int), way=np.zeros((2, count)),
     )  # fmt: skip
+
+
+def obeying_laws(windows: Windows, laws: Laws | None) -> Windows:
+    """The windows of a robot that obeys some laws, whose wheels begin each piece at the angle 0."""
+    if laws is None:
+        return windows._replace(laws=None)
+    return windows._replace(laws=laws._replace(phase=np.zeros((len(laws.value), len(windows.run)))))
 
 
 def with_room(windows: Windows) -> Windows:

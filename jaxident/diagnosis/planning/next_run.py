@@ -16,7 +16,7 @@ from jaxident.array_types import Array
 from jaxident.diagnosis.motion.linear import START_STATES, follow, gram, left_over, linearise
 from jaxident.diagnosis.motion.paths import track
 from jaxident.diagnosis.motion.responses import respond
-from jaxident.diagnosis.motion.windows import Windows, cut, uncut
+from jaxident.diagnosis.motion.windows import Windows, cut, obeying_laws, uncut
 from jaxident.diagnosis.noise.law import whitener_of
 from jaxident.diagnosis.planning.question import Question, ask, check_names, expected_size, noise_of
 from jaxident.diagnosis.planning.trial_inputs import ORDINARY, draw, make, vary
@@ -126,7 +126,7 @@ def separations(question: Question, commands: Array) -> np.ndarray:
     t, run = np.tile(question.period * np.arange(samples), count), np.repeat(np.arange(count), samples)
     right, left = commands.reshape(-1, 2).T
     log = make_log(t, right, left, x, y, theta, run)
-    windows = cut(log, question.rows)._replace(session=np.zeros(count), laws=question.laws)
+    windows = obeying_laws(cut(log, question.rows)._replace(session=np.zeros(count)), question.laws)
     starts = states[:, windows.first, windows.run]
     linear = linearise(question.base, starts, windows, list(range(len(NOMINAL))))
     lanes = np.broadcast_to(starts, (len(question.vectors), *starts.shape))
@@ -161,4 +161,4 @@ _track = jax.jit(track)
 
 def _paths(question: Question, whole: Windows) -> np.ndarray:
     """States (5, samples, inputs) of the robot without the two effects, from rest at the origin."""
-    return np.stack(_track(question.base, np.zeros((START_STATES, len(whole.run))), whole._replace(laws=question.laws)))
+    return np.stack(_track(question.base, np.zeros((START_STATES, len(whole.run))), obeying_laws(whole, question.laws)))

@@ -9,7 +9,7 @@ from jaxident.diagnosis.fit.nominal import rough_fit
 from jaxident.diagnosis.fit.refit import Solution
 from jaxident.diagnosis.laws.wheel_angle import parts_of
 from jaxident.diagnosis.motion.linear import follow, without_starts
-from jaxident.diagnosis.motion.windows import Windows, take
+from jaxident.diagnosis.motion.windows import Windows, obeying_laws, take
 from jaxident.diagnosis.noise.law import Law, first_law, white_whitener
 from jaxident.effects.coordinates import NOMINAL, neutral_vector
 from jaxident.effects.law_arrays import laws_of
@@ -31,9 +31,7 @@ def obeying_given(
     The angles at which wheels begin are those that fit best beside the effects of that vector, for each part of a run
     by itself.
     """
-    found, plain = laws_of(laws, largest), windows
-    if found is not None:
-        windows = plain._replace(laws=found._replace(phase=np.zeros((len(found.value), len(plain.run)))))
+    plain, windows = windows, obeying_laws(windows, laws_of(laws, largest))
     if of_wheels := [k for k, own in enumerate(laws) if own.signal == ANGLE]:
         windows, vector = _turned(windows, of_wheels, rough_fit(plain, vector, law), law)
     return windows, rough_fit(windows, neutral_vector(vector[: len(NOMINAL)]), law)

@@ -10,10 +10,11 @@ from jaxident.diagnosis.motion.driving import AT_ONCE, FEW_WINDOWS, _pushed, pus
 from jaxident.diagnosis.motion.linear import follow
 from jaxident.diagnosis.motion.paths import push_of, residuals, rolled
 from jaxident.diagnosis.motion.rims import rim_speeds
-from jaxident.diagnosis.motion.windows import take
+from jaxident.diagnosis.motion.windows import obeying_laws, take, uncut, with_room
 from jaxident.effects.catalogue import CATALOGUE
 from jaxident.effects.coordinates import PLACES, from_catalogue
 from jaxident.effects.fast_input import REMEMBERING
+from jaxident.effects.law_arrays import IDLE, laws_of
 
 OTHERS = ("turn_loss", "slope", "transport_delay", "mass_offset")
 _push, _residuals, _rolled = jax.jit(push_of), jax.jit(residuals), jax.jit(rolled)
@@ -76,3 +77,9 @@ def test_logs_of_other_lengths_run_through_the_same_programs(windows):
         assert follow(VECTOR[None], starts_of(1, few), few).shape[1] == count
         compiled.append((linear._residuals._cache_size(), _pushed._cache_size()))
     assert len(set(compiled)) == 1
+
+
+def test_windows_of_a_plan_get_room_beside_laws():
+    """Five inputs take the room of six; each has the angles of its wheels."""
+    windows = with_room(obeying_laws(uncut(np.zeros((5, 300, 2)), 0.05), laws_of([IDLE])))
+    assert windows.laws.phase.shape[1] == len(windows.run) == 6
