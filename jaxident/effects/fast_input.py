@@ -5,7 +5,8 @@ integrals of what the wheels were asked for, so that it switches where it should
 """
 
 import functools
-from collections.abc import Callable, Mapping
+import operator
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import jax
@@ -21,10 +22,13 @@ from jaxident.robot.drive import Physical, force, wheel_speeds
 PUSHING = tuple(effect.name for stage in INPUT for effect in CHAIN[stage] if effect.search is not None)
 """Effects that act before the wheels: beside the dead zones, pushes depend on nothing else but, by some coordinates
 (`coordinates.BY_DRIVE`), on the nominal drive."""
-REMEMBERING = tuple(effect.name for stage in ("slew", "gear") for effect in CHAIN[stage] if effect.search is not None)
-"""Effects among these that remember: each takes a loop over all rows."""
+OPTIONAL = tuple(
+    effect.name for stage in ("arrival", "slew", "gear") for effect in CHAIN[stage] if effect.search is not None
+)
+"""Effects among these that cost where no robot has them: a late arrival reads the rows at other times, and what slews
+or is in the gears takes a loop over all rows."""
 Acts = Mapping[str, Array]
-"""For names of REMEMBERING whether any robot of a call has the effect, truth values (); others pass all as it is."""
+"""For names of OPTIONAL whether any robot of a call has the effect, truth values ()."""
 SUBSTEPS = 2
 """Per row; the nominal part is exact whatever their number."""
 RUN_UP = 3.0
@@ -62,16 +66,23 @@ def expected_pushes(
     asked, jolt = _asked(settings, dead_zone, t, session, command, own, acts), None
     if lost is not None:
         asked, jolt = _expected(asked, lost)
-    asked = _read(asked, arrived, own, t, part)
+    read = functools.partial(_read, arrived=arrived, own=own, t=t, part=part)
+    asked = _unless_idle([effect for effect, _ in acting("arrival", settings)], acts, read, asked, _in_line)
     return _remembered(settings, drive, asked, part, acts), jolt
 
 
-def _unless_idle(effect: EffectRecord, acts: Acts | None, run: Callable[[Any], Any], value: Any) -> Any:
-    """What an effect that remembers makes of a value: a loop over rows, which is left out where `acts` says that it
-    does nothing. Without `acts`, and of effects that are not in it, every loop is run."""
-    if acts is None or effect.name not in acts:
+def _unless_idle(
+    effects: Sequence[EffectRecord],
+    acts: Acts | None,
+    run: Callable[[Any], Any],
+    value: Any,
+    idle: Callable[[Any], Any] = lambda same: same,
+) -> Any:
+    """What some effects make of a value, or what is left of it (`idle`) where `acts` says that none of them does
+    anything. Without `acts`, and for effects that are not in it, they are run."""
+    if acts is None or any(effect.name not in acts for effect in effects):
         return run(value)
-    return jax.lax.cond(acts[effect.name], run, lambda same: same, value)
+    return jax.lax.cond(functools.reduce(operator.or_, (acts[effect.name] for effect in effects)), run, idle, value)
 
 
 def _lengths(t: Array) -> Array:
@@ -97,7 +108,7 @@ def _asked(
     slews = []
     for effect, values in acting("slew", settings):
         run = functools.partial(_slewed, effect, values, step=part * SUBSTEPS)
-        slews.append((effect, values, _unless_idle(effect, acts, run, sent)))
+        slews.append((effect, values, _unless_idle([effect], acts, run, sent)))
 
     def at(elapsed):
         """The pushes `elapsed` [s] (rows, runs) after each row."""
@@ -143,7 +154,7 @@ def _slewed(effect: EffectRecord, values, sent: Wheels, step: Array) -> Wheels:
 def _read(asked: Push, arrived: Array, own: Array, t: Array, part: Array) -> Push:
     """Pushes that were asked for on the time axis of arrivals (rows, runs), substeps `own` long, as means and slopes
     over the substeps `part` of the rows themselves; nothing is asked for before the first row arrives."""
-    mean, slope = (_flat(values) for values in asked)
+    mean, slope = _in_line(asked)
     given, size = (_flat(jnp.broadcast_to(each[:, :, None], asked.mean.shape[:3])) for each in (own, part))
     nodes, starts = t[:1] + _integral(size), arrived[:1] + _integral(given)[:-1]
     given, size = given[..., None], size[..., None]
@@ -168,6 +179,11 @@ def _read(asked: Push, arrived: Array, own: Array, t: Array, part: Array) -> Pus
     return Push(mean, slope)
 
 
+def _in_line(asked: Push) -> Push:
+    """Pushes (rows, runs, substeps, 2) as (rows * substeps, runs, 2)."""
+    return Push(*map(_flat, asked))
+
+
 def _flat(values: Array) -> Array:
     """(rows, runs, substeps, ...) to (rows * substeps, runs, ...)."""
     return jnp.moveaxis(values, 2, 1).reshape(-1, values.shape[1], *values.shape[3:])
@@ -185,7 +201,7 @@ def _remembered(settings, drive: Physical, asked: Push, part: Array, acts: Acts 
     for effect, values in acting("gear", settings):
         law = functools.partial(scanned, effect) if effect.fast is None else effect.fast
         run = functools.partial(_passed, law, drive, size, values)
-        asked = _unless_idle(effect, acts, run, asked)
+        asked = _unless_idle([effect], acts, run, asked)
     return Push(*(x.reshape(rows, SUBSTEPS, runs, 2).transpose(0, 2, 1, 3) for x in asked))
 
 

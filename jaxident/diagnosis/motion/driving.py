@@ -15,7 +15,7 @@ from jaxident.array_types import Array, Wheels
 from jaxident.diagnosis.motion.paths import push_of
 from jaxident.diagnosis.motion.windows import Windows, filled_up, with_room
 from jaxident.effects.coordinates import BY_DRIVE, NOMINAL, PLACES, neutral_vector
-from jaxident.effects.fast_input import PUSHING, REMEMBERING, Push
+from jaxident.effects.fast_input import OPTIONAL, PUSHING, Push
 from jaxident.parallel import in_parallel
 from jaxident.programs import kept_program
 
@@ -28,7 +28,7 @@ FEW_PIECES = 16
 between was tried)."""
 _BY_DRIVE = [PLACES[pair] for pair in sorted(BY_DRIVE)]
 _PUSHING = [6, 7, *(place for (name, _), place in PLACES.items() if name in PUSHING)]
-_REMEMBERING = {name: [place for (own, _), place in PLACES.items() if own == name] for name in REMEMBERING}
+_OPTIONAL = {name: [place for (own, _), place in PLACES.items() if own == name] for name in OPTIONAL}
 _NEUTRAL = neutral_vector(np.zeros(len(NOMINAL)))
 
 
@@ -68,9 +68,8 @@ def pushes_of(vectors: Array, windows: Windows) -> list[Push]:
     Vectors that drive the wheels alike, as most columns of a linearisation do, share what costs most. Wheels that coast
     in their play are driven alike by equal drives only.
     """
-    driven = vectors[:, _PUSHING]
-    if np.any(vectors[:, _BY_DRIVE] > 0.0):
-        driven = np.concatenate([driven, vectors[:, : len(NOMINAL)]], axis=1)
+    coasts = np.any(vectors[:, _BY_DRIVE] > 0.0, axis=1, keepdims=True)
+    driven = np.concatenate([vectors[:, _PUSHING], coasts * vectors[:, : len(NOMINAL)]], axis=1)
     _, first, own = np.unique(driven, axis=0, return_index=True, return_inverse=True)
     size = AT_ONCE if windows.t.shape[1] <= FEW_PIECES else 1
     blocks = [np.resize(first[k : k + size], size) for k in range(0, len(first), size)]
@@ -82,6 +81,6 @@ def pushes_of(vectors: Array, windows: Windows) -> list[Push]:
 @kept_program(Windows, Wheels, Push)
 def _pushed(vectors: Array, windows: Windows) -> list[Push]:
     """`push_of` under each vector (batch, SIZE)."""
-    acts = {name: jnp.any(vectors[:, own] != _NEUTRAL[own]) for name, own in _REMEMBERING.items()}
+    acts = {name: jnp.any(vectors[:, own] != _NEUTRAL[own]) for name, own in _OPTIONAL.items()}
     found = jax.vmap(push_of, in_axes=(0, None, None))(vectors, windows, acts)
     return [jax.tree.map(lambda part, k=k: part[k], found) for k in range(len(vectors))]
