@@ -89,12 +89,11 @@ def test_the_law_that_is_found_first_acts_where_the_hidden_effect_does(hidden, k
     logs = as_logs(drive(robot, hidden, 1.0, RUNS, 1002))
     found = discover(find_effects(prepare(logs, None))[1])
     assert found
-    # weak brakes are named as a drag and a traction limit; the first law mends that drag, the second is the true one;
-    # a patch slows both motions, and what it does to the turn rate comes first
-    last = found[1 if hidden in ("brakes", "patch") else 0].curves[-1]
-    assert last.kind == kind
+    # weak brakes are named as a drag and a traction limit; the first law mends that drag, the second is the true one
+    assert found[1 if hidden == "brakes" else 0].curves[-1].kind == kind
     if hidden == "patch":
-        form = form_of(as_law(last), last.density)
+        law = as_law(found[0].curves[0])
+        form = form_of(law, found[0].curves[0].density)
         assert form is not None
         assert np.hypot(form.parameters["x0"] - 0.2, form.parameters["y0"] + 0.1) < 0.1
         assert abs(form.parameters["radius"] - 0.35) < 0.1
