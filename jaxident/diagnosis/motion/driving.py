@@ -69,7 +69,7 @@ def pushes_of(vectors: Array, windows: Windows) -> list[Push]:
     in their play are driven alike by equal drives only.
     """
     coasts = np.any(vectors[:, _BY_DRIVE] > 0.0, axis=1, keepdims=True)
-    driven = np.concatenate([vectors[:, _PUSHING], coasts * vectors[:, : len(NOMINAL)]], axis=1)
+    driven = np.concatenate([vectors[:, _PUSHING], np.where(coasts, vectors[:, : len(NOMINAL)], 0.0)], axis=1)
     _, first, own = np.unique(driven, axis=0, return_index=True, return_inverse=True)
     size = AT_ONCE if windows.t.shape[1] <= FEW_PIECES else 1
     blocks = [np.resize(first[k : k + size], size) for k in range(0, len(first), size)]

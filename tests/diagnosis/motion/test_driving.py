@@ -61,7 +61,7 @@ def test_vectors_side_by_side_are_those_one_after_the_other(windows, count, copi
 def test_an_effect_that_no_vector_has_is_left_out_and_changes_nothing(windows, name):
     vectors = np.stack([VECTOR, vector_with(name)])
     for vector, found in zip(vectors, pushes_of(vectors, windows), strict=True):
-        whole = _push(vector, windows)  # leaves nothing out; a delay reads up to 1e-8 of a push early
+        whole = _push(vector, windows)  # leaves nothing out; a delay of 0 reads JUST_BEFORE
         size = [np.abs(part).max() for part in whole]
         for part, other, largest in zip(found, whole, size, strict=True):
             np.testing.assert_allclose(part, other, atol=2e-8 * max(largest, 1.0))
