@@ -20,8 +20,8 @@ FLAT = 1e-3
 value was tried."""
 HELD = 1e6
 """Precision of what the nominal robot has as well, in the same unit. Were it free, a gain could grow while a curve
-falls: along that bent valley a refit did not arrive in ten steps (warm motors). At 1e3 a curve of large s did the same:
-on a rough patch of floor a rate fell from 4.4 to 0.1 1/s."""
+falls: along that bent valley a refit did not arrive in ten steps (warm motors). At 1e3 the prior held
+nothing of a curve whose s is large: a rate fell from 4.4 to 0.1 1/s (one robot, patch 1 of `experiments.unlisted`)."""
 SIZES = np.geomspace(1e-8, 1e8, 65)
 """Variances s^2 that are tried, in units of the mean variance of a knot's value without a prior."""
 FOLDS = 4
