@@ -12,7 +12,7 @@ from jaxident.diagnosis.laws.candidates import Candidate, Turning, columns_of, p
 from jaxident.diagnosis.laws.kinds import Kind, nominal_part
 from jaxident.diagnosis.motion.linear import Gram, Linear, gram, linearise
 from jaxident.diagnosis.motion.responses import respond
-from jaxident.diagnosis.motion.windows import Windows
+from jaxident.diagnosis.motion.windows import Windows, obeying_laws
 from jaxident.diagnosis.noise.law import Law
 from jaxident.effects.coordinates import limits
 from jaxident.effects.law_arrays import joined, laws_of
@@ -67,11 +67,11 @@ def obeying(windows: Windows, curves: tuple[Curve, ...]) -> Windows:
     laws = laws_of([as_law(curve) for curve in curves])
     if laws is None:
         return windows
-    phase = np.zeros((len(laws.phase), len(windows.run)))
+    laws = obeying_laws(windows, laws).laws
     for k, curve in enumerate(curves):
         if curve.turning is not None:
-            phase[k] = curve.turning.phase
-    return windows._replace(laws=joined(windows.laws, laws._replace(phase=phase)))
+            laws.phase[k] = curve.turning.phase
+    return windows._replace(laws=joined(windows.laws, laws))
 
 
 def as_law(curve: Curve, largest: float = 1.0) -> Discovered:
