@@ -59,8 +59,7 @@ def kept_program(*tuples: type, static: tuple[str, ...] = ()) -> Callable[[Calla
             if program is None:
                 name = f"{function.__module__}.{function.__qualname__}"
                 path = pathlib.Path(folder) / f"program-{_digest(name, *map(str, key)).hex()}"
-                program = _read(path) or _made(functools.partial(compiled, **own), args, kwargs, path)
-                programs[key] = program
+                program = programs[key] = _program(functools.partial(compiled, **own), args, kwargs, path)
             return program(*args, **kwargs)
 
         call._cache_size = lambda: len(programs) + compiled._cache_size()  # type: ignore[attr-defined]
@@ -85,26 +84,33 @@ def _shape(leaf: Any) -> tuple:
         return jax.numpy.shape(leaf), jax.numpy.result_type(leaf)
 
 
-def _made(function: Callable, args: tuple, kwargs: dict[str, Any], path: pathlib.Path) -> Callable:
-    """The program of a function at some arguments, kept in a file where that is possible."""
-    program = jax.jit(function)
-    try:
-        exported = jax.export.export(program)(*args, **kwargs)
-    except ValueError:  # it calls a library in a way that may change
-        return program
-    _write(path, bytes(exported.serialize()))
-    return jax.jit(exported.call)
+def _program(function: Callable, args: tuple, kwargs: dict[str, Any], path: pathlib.Path) -> Callable:
+    """The program of a function at some arguments: from a file, or kept in it where that is possible.
+
+    It is compiled for shapes, not for the arguments themselves. For these, JAX compiles again where one was an array of
+    NumPy and the next is one of JAX, or the other way: two programs of `identify`, 4 of 29 s of a first call.
+    """
+    traced = _read(path)
+    if traced is None:
+        program = jax.jit(function)
+        try:
+            traced = jax.export.export(program)(*args, **kwargs)
+        except ValueError:  # it calls a library in a way that may change
+            return program
+        _write(path, bytes(traced.serialize()))
+    args, kwargs = jax.tree.map(lambda leaf: jax.ShapeDtypeStruct(*_shape(leaf)), (args, kwargs))
+    return jax.jit(traced.call).lower(*args, **kwargs).compile()
 
 
-def _read(path: pathlib.Path) -> Callable | None:
-    """The program of a file, or None where there is none or it is damaged."""
+def _read(path: pathlib.Path) -> jax.export.Exported | None:
+    """What a file keeps of a program, or None where there is none or it is damaged."""
     try:
         data = path.read_bytes()
     except OSError:
         return None
     if hashlib.sha256(data[DIGEST:]).digest() != data[:DIGEST]:
         return None
-    return jax.jit(jax.export.deserialize(bytearray(data[DIGEST:])).call)
+    return jax.export.deserialize(bytearray(data[DIGEST:]))
 
 
 def _write(path: pathlib.Path, data: bytes) -> None:

@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 import pytest
 
 from jaxident import programs
@@ -64,6 +65,15 @@ def test_each_shape_type_setting_and_tree_has_its_own(folder):
     assert program(PAIR, 3, 5.0).a.tolist() == [6.0, 13.0]
     assert program._cache_size() == 6
     assert len(list(folder.glob("program-*"))) == 6
+
+
+def test_arrays_of_numpy_and_of_jax_have_one_compiled_program(caplog):
+    program, numpy_pair = Traces().program(), Pair(np.asarray(PAIR.a), np.asarray(PAIR.b))
+    with jax.log_compiles():
+        results = [program(pair, 3, 1.0) for pair in (PAIR, numpy_pair, program(PAIR, 3, 1.0)._replace(b=PAIR.b))]
+    assert results[0].a.tolist() == results[1].a.tolist() == [2.0, 9.0]
+    compiled = [record for record in caplog.records if record.message.startswith("Compiling jit(call)")]
+    assert len(compiled) == 1
 
 
 def test_a_damaged_file_is_made_anew(folder):
