@@ -18,10 +18,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from jaxident.array_types import Array, Column, Gains, Rows, Square, Unknowns, UnknownsMatrix
+from jaxident.array_types import Array, Column, Gains, Pose, Rows, Square, Unknowns, UnknownsMatrix, Wheels
 from jaxident.estimation.poses.parameters import Law, is_logarithmic, names
 from jaxident.estimation.poses.runs import Runs, row_times, rows_used
 from jaxident.numerics import safe_divide, sin_cos, wrap
+from jaxident.programs import kept_program
 from jaxident.robot.drive import TYPICAL_RATE
 
 RATE, RATE_SPREAD = TYPICAL_RATE, 1.175
@@ -65,7 +66,7 @@ def coasting(rate: Array, seconds: float, driven: Array, doubted: bool) -> np.nd
     return (rate < SLOWEST_ROBOT) & (rate * seconds < 1.0) & (doubted | ~driven)
 
 
-@jax.jit
+@kept_program(Prior, Runs, Wheels, Pose)
 def prior_of(runs: Runs) -> Prior:
     """The prior for runs (runs, rows); pure, maps over trials."""
     largest = jnp.maximum(jnp.max(jnp.abs(jnp.stack(runs.command))), 1e-12)
