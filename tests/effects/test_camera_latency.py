@@ -13,6 +13,7 @@ from jaxident.diagnosis.motion.windows import cut
 from jaxident.diagnosis.preparation.prepare import prepare
 from jaxident.effects.coordinates import POSES_ONLY, vector_of
 from jaxident.estimation.increments.observations import poses_only
+from jaxident.log import join
 from jaxident.robot.noise import Noise
 from jaxident.robot.wheel_sensor import WheelSensor
 
@@ -26,7 +27,7 @@ def robot_with(*effects, noise=None, wheel_noise=0.0):
                                wheels=WheelSensor(0.03, 0.1, wheel_noise))  # fmt: skip
 
 
-def driven(robot, rows=120, key=None):
+def driven(robot, rows=320, key=None):
     """A log whose levels last 8 to 30 rows: were all as long, reading commands now and then would be a delay, too."""
     rng = np.random.default_rng(0)
     levels, lasting = rng.uniform(-1.0, 1.0, (rows // 8, 2)), rng.integers(8, 30, rows // 8)
@@ -50,7 +51,7 @@ def test_a_late_command_makes_both_late():
 
 
 def test_rims_of_a_diagnosis_are_without_it():
-    windows = cut(driven(robot_with("camera_latency")), 40)
+    windows = cut(join([driven(robot_with("camera_latency"))] * 3), 40)
     starts = np.zeros((2, 5, len(windows.run)))
     plain, late = rim_speeds(np.stack([vector_of(robot_with(*names)) for names in ((), ("camera_latency",))]),
                              starts, windows)  # fmt: skip

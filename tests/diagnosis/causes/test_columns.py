@@ -335,6 +335,6 @@ def test_accelerations_stand_for_a_robot_of_the_typical_rate():
 
 
 def way(vector):
-    """Poses of a run, the heading as it goes on."""
-    poses = windows_of(vector, law=Law(1e-12, 1e-12), runs=1).pose.reshape(-1, 3)
+    """Poses of some runs, the heading as it goes on."""
+    poses = windows_of(vector, law=Law(1e-12, 1e-12)).pose.reshape(-1, 3)
     return np.column_stack([poses[:, :2], np.unwrap(poses[:, 2])])

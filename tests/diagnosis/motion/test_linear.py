@@ -2,14 +2,12 @@
 
 import numpy as np
 import pytest
+from support.small_robot import VECTOR, windows_of
 
 from jaxident.diagnosis.causes.discrepancy_basis import pursue
 from jaxident.diagnosis.motion.linear import follow, gram, left_over, linearise
 from jaxident.diagnosis.motion.responses import answer_to_start
-from jaxident.diagnosis.motion.windows import cut
-from jaxident.effects.coordinates import PLACES, neutral_vector, nominal_vector
-from jaxident.log import make_log
-from jaxident.robot.drive import Physical
+from jaxident.effects.coordinates import PLACES
 
 
 def squares(columns, target):
@@ -46,42 +44,36 @@ def test_pursuit_finds_what_was_put_in_and_stops():
     assert [place for place, _ in pursue(whole.T @ whole, [0, 1], list(range(2, 42)), dear)] == [7]
 
 
-START = np.array([[0.3], [-0.2], [0.5], [0.2], [1.0]])
+STARTS = np.tile([[0.3], [-0.2], [0.5], [0.2], [1.0]], 24)
 
 
 @pytest.fixture
-def window():
-    """One window of a nominal robot under four commands, and its vector."""
-    rng = np.random.default_rng(2)
-    rows = 40
-    u = np.repeat(rng.uniform(-1.0, 1.0, (4, 2)), 10, axis=0)
-    t = np.arange(rows) * 0.03
-    log = make_log(t, u[:, 0], u[:, 1], 0.0 * t, 0.0 * t, 0.0 * t)
-    drive = Physical(np.array([4.0, 5.0]), np.array([[1.2, 1.1], [9.0, -8.5]]))
-    return cut(log, rows), neutral_vector(nominal_vector(drive, np.array([0.1, 0.1])))
+def windows():
+    """Windows of the small robot's commands, no pose of which is anywhere but at the origin."""
+    found = windows_of(VECTOR)
+    return found._replace(pose=np.zeros_like(found.pose))
 
 
 def by_starts(vector, windows):
     """Residuals, and derivatives by the start states as plain differences."""
-    lanes = START + 1e-6 * np.concatenate([np.zeros((1, 5)), np.eye(5)])[:, :, None]
+    lanes = STARTS + 1e-6 * np.concatenate([np.zeros((1, 5)), np.eye(5)])[:, :, None]
     found = follow(np.tile(vector, (6, 1)), lanes, windows)
     return found[0], np.moveaxis((found[:1] - found[1:]) / 1e-6, 0, -1)
 
 
-def test_start_speeds_answer_as_a_robot_does_that_loses_speed_in_turns(window):
-    windows, vector = window
+def test_start_speeds_answer_as_a_robot_does_that_loses_speed_in_turns(windows):
+    vector = VECTOR.copy()
     vector[PLACES["turn_loss", "loss"]] = 8.0
     residual, wanted = by_starts(vector, windows)
-    own = linearise(vector, START, windows, [0]).starts
+    own = linearise(vector, STARTS, windows, [0]).starts
     nominal = answer_to_start(np.exp(vector[:2]), residual, windows)
     size = np.abs(wanted[..., 3:]).max()
     np.testing.assert_allclose(own[..., 3:], wanted[..., 3:], atol=1e-3 * size)
     assert np.abs(nominal - wanted).max() > 0.2 * size
 
 
-def test_start_states_answer_as_differences_do(window):
-    windows, vector = window
-    residual, wanted = by_starts(vector, windows)
-    own = answer_to_start(np.exp(vector[:2]), residual, windows)
+def test_start_states_answer_as_differences_do(windows):
+    residual, wanted = by_starts(VECTOR, windows)
+    own = answer_to_start(np.exp(VECTOR[:2]), residual, windows)
     # headings between rows are taken as straight: a few parts in a thousand
     np.testing.assert_allclose(own, wanted, atol=5e-3 * np.abs(wanted).max())

@@ -16,7 +16,7 @@ from jaxident.robot.drive import Physical
 from jaxident.robot.model import Discovered, Model
 from jaxident.robot.noise import Noise
 
-ROWS, RUNS, STEP = 600, 3, 0.05
+ROWS, RUNS, STEP = 320, 4, 0.05
 NOISE = Noise(3e-4, 2e-3)
 ROBOT = Model(STEP, Physical(np.array([3.0, 5.0]), np.array([[0.4, 0.39], [4.5, -4.6]])), np.array([0.16, 0.2]), NOISE)
 AT, ROUND, FLOOR = np.linspace(-3.0, 3.0, 9), np.linspace(-np.pi, np.pi, 10), np.linspace(-1.0, 1.0, 5)
@@ -31,7 +31,7 @@ def runs_of(model: Model, seed: int = 0):
     """Some runs of a robot with noise; in a unit in which the largest command is near 2."""
     rng, t, logs = np.random.default_rng(seed), STEP * np.arange(ROWS), []
     for run in range(RUNS):
-        u = np.repeat(rng.uniform(-2.0, 2.0, (ROWS // 15, 2)), 15, axis=0)
+        u = np.repeat(rng.uniform(-2.0, 2.0, (ROWS // 16, 2)), 16, axis=0)
         log = make_log(t, u[:, 0], u[:, 1], *np.zeros((3, ROWS)))
         logs.append(ji.simulate(model, log, key=jax.random.key(10 * seed + run)))
     return join(logs)
