@@ -128,7 +128,7 @@ def test_motors_are_found_on_blocks_without_a_camera(folder):
     page = (folder / "motors.html").read_text()
     assert "The motors" in page
     assert "Commands and wheel speeds, measured and modelled" in page
-    ended = jaxident("predict", "motors.json", "log.csv", "--horizon", "20", "--out", "ahead.csv", cwd=folder)
+    ended = jaxident("predict", "motors.json", "log.csv", "--horizon", "60", "--out", "ahead.csv", cwd=folder)
     assert ended.returncode == 0, ended.stderr
     ended = jaxident(*words.replace("blocks.csv", "plain.csv").split(), cwd=folder)
     assert (ended.returncode, "no wheel speeds" in ended.stderr) == (2, True)
