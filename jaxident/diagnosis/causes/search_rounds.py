@@ -16,7 +16,7 @@ from jaxident.diagnosis.causes.columns import Table, answers_of, tabulate
 from jaxident.diagnosis.causes.discrepancy import UNEXPLAINED, Rest
 from jaxident.diagnosis.causes.discrepancy_basis import WORTH
 from jaxident.diagnosis.causes.evidence import worth
-from jaxident.diagnosis.causes.moves import Move, better, fit_options, ranked, stands
+from jaxident.diagnosis.causes.moves import Move, better, fit_options, ranked, stands, united
 from jaxident.diagnosis.causes.search import MOST_EFFECTS, best_set
 from jaxident.diagnosis.causes.settled import Settled, noise_beside, same_law, whiten
 from jaxident.diagnosis.fit.nominal import coasts, fit_without_effects
@@ -83,9 +83,10 @@ def search(windows: Windows, nominal: Solution, without: Collection[str] = (), l
 
     The search begins at white noise. Where its end leaves something, a second search begins at noise as the nominal fit
     leaves it (`ends.best_end` chooses). A nominal model misses a real robot by twenty times the camera's error, and a
-    search that takes all of that for effects may lose its way. Where both ends are worse than no effect at all, the
-    only end has no effect. Where the robot coasts, with its effects too, the first end is the only one: its rates are
-    to be held, and the search made again (`finding.find_effects`).
+    search that takes all of that for effects may lose its way. Where the two ends differ, a third search begins at the
+    effects of both. Where all ends are worse than no effect at all, the only end has no effect. Where the robot coasts,
+    with its effects too, the first end is the only one: its rates are to be held, and the search made again
+    (`finding.find_effects`).
     """
     begin, sized, without = Move(nominal, (), -nominal.cost), law is None, {*without, *untold(windows)}
     wheel = first_noise(nominal.linear.rims, np.exp(nominal.vector[:2]), windows)
@@ -98,6 +99,10 @@ def search(windows: Windows, nominal: Solution, without: Collection[str] = (), l
         law = size_noise(nominal.linear.residual, nominal.linear.starts, windows, responses)._replace(wheel=wheel)
         single = best_single(windows, nominal, law, without)
         ends.append(climb(windows, nominal, single, law, without, memory_last=False))
+        one, other = sorted(ends, key=lambda end: -end.log_evidence)
+        both = united(one.settled.now, other.settled.now)
+        if both.effects != one.settled.now.effects:
+            ends.append(climb(windows, nominal, both, one.law, without, memory_last=False))
     ends = [each for each in ends if not each.worse_than_none]
     if not ends:
         ends = [climb(windows, nominal, begin, law, COORDINATES, sized, memory_last=False)]

@@ -11,7 +11,7 @@ from jaxident.diagnosis.causes.discrepancy import Rest
 from jaxident.diagnosis.causes.discrepancy_basis import Term
 from jaxident.diagnosis.causes.evidence import evidence_of, log_evidence
 from jaxident.diagnosis.causes.finding import finding_of, let_go
-from jaxident.diagnosis.causes.moves import ARRIVED, better, fit_options, look_alikes, stands
+from jaxident.diagnosis.causes.moves import ARRIVED, better, fit_options, look_alikes, stands, united
 from jaxident.diagnosis.causes.search_rounds import Found, defended, settle
 from jaxident.diagnosis.causes.settled import Settled
 from jaxident.diagnosis.fit.refit import refit
@@ -212,6 +212,21 @@ def test_a_search_that_begins_with_wrong_effects_ends_with_the_right_one(lagging
     assert state.now.effects == ("motor_lag",)
     assert state.tried[frozenset({"motor_lag"})] == 0.0
     assert state.table.here.keys() == {"motor_lag"}
+
+
+def test_a_search_from_the_effects_of_two_ends_ends_with_the_right_ones():
+    """Each of the two has one effect of the robot's two, and one that it has not."""
+    windows = windows_of(robot_with({DELAY: 0.08, LOSS: 0.3}))
+    begins = {DELAY: 0.08, SAG: 0.1}, {SAG: 0.2, LOSS: 0.3, **SLOPE}
+    names = [tuple(dict.fromkeys(name for name, _ in begin)) for begin in begins]
+    one, other = (stands(fitted(windows, own, begin)[1], own) for own, begin in zip(names, begins, strict=True))
+    both = united(one, other)
+    assert both.effects == ("transport_delay", "supply_sag", "turn_loss", "slope")
+    for pair, owner in ((DELAY, one), (SAG, one), (LOSS, other)):
+        assert both.fit.vector[PLACES[pair]] == owner.fit.vector[PLACES[pair]]
+    assert one.fit.vector[PLACES[LOSS]] == 0.0, "the fit itself stays"
+    state = settle(windows, both, first_law(windows), None)
+    assert set(state.now.effects) == {"transport_delay", "turn_loss"}
 
 
 def test_the_evidence_of_a_refit_is_what_the_table_promises():
